@@ -1,0 +1,46 @@
+"""Errors that a user can act on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class InputError(ValueError):
+    """Input that cannot be used: says which file, line and field, what is wrong and what to do.
+
+    The command line prints it as one line and exits with code 2.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        file: str | Path | None = None,
+        line: int | None = None,
+        field: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        self.problem = problem
+        self.file = None if file is None else Path(file)
+        self.line = line
+        self.field = field
+        self.hint = hint
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        where = "" if self.file is None else str(self.file)
+        if self.line is not None:
+            where += f":{self.line}"
+        parts = [part for part in (where, self.field and f"field '{self.field}'") if part]
+        text = ": ".join([*parts, self.problem])
+        return text if self.hint is None else f"{text} ({self.hint})"
+
+
+class MissingExtraError(InputError):
+    """A feature needs an optional dependency that is not installed."""
+
+    def __init__(self, feature: str, extra: str) -> None:
+        super().__init__(
+            f"{feature} needs the '{extra}' extra",
+            hint=f"pip install 'tensegrity-estimation[{extra}]'",
+        )

@@ -1,0 +1,51 @@
+"""What an estimator says about a recording: one row per sample of the base IMU."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Estimates from the end of the static start to the end of the recording.
+
+    Frames: world (z up), body (the base IMU). Shapes with N rows and E endcaps:
+
+    * ``t_ns`` (N,) [ns]
+    * ``position`` (N, 3) of the body in the world [m]; ``quaternion`` (N, 4) x, y, z, w
+    * ``velocity`` (N, 3) in the world [m/s]
+    * ``gyro_bias`` (N, 3) [rad/s], ``accel_bias`` (N, 3) [m/s^2]
+    * ``spin`` (N,) angle of the shape about the base rod, phi [rad]
+    * ``endcaps_body`` (N, E, 3), ``endcaps_world`` (N, E, 3) [m]
+    * ``contacts`` (N, E) endcaps the filter holds as contacts
+    * ``position_covariance`` (N, 3, 3) of the position error in the world [m^2]
+    * ``orientation_covariance`` (N, 3, 3) of the rotation error in the world [rad^2]
+    * ``velocity_covariance`` (N, 3, 3) [m^2/s^2]
+    * ``health`` counters by name, each (N,), cumulative from the start
+    """
+
+    t_ns: IntArray
+    position: FloatArray
+    quaternion: FloatArray
+    velocity: FloatArray
+    gyro_bias: FloatArray
+    accel_bias: FloatArray
+    spin: FloatArray
+    endcaps_body: FloatArray
+    endcaps_world: FloatArray
+    contacts: NDArray[np.bool_]
+    position_covariance: FloatArray
+    orientation_covariance: FloatArray
+    velocity_covariance: FloatArray
+    health: dict[str, IntArray] = field(default_factory=dict)
+    runtime_s: float = 0.0
+    """Wall-clock time spent in the estimator [s]."""
+    info: dict[str, Any] = field(default_factory=dict)
+    """Method, sequence name and whatever else describes the run."""
