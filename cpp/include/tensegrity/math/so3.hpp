@@ -1,0 +1,127 @@
+// Rotations: the group SO(3) and the integrals of its exponential.
+//
+// Every Lie group in this folder offers the same names: Dof, Tangent, Exp, Log, Adj, inverse,
+// operator*, and the left Jacobian J_l with Exp(x + J_l(x)^-1 dx) ~ Exp(dx) Exp(x).
+#pragma once
+
+#include <cmath>
+
+#include "tensegrity/types.hpp"
+
+namespace tensegrity {
+
+// The skew-symmetric matrix of a vector: hat(a) b = a x b.
+template <typename Derived>
+Matrix3<typename Derived::Scalar> hat(const Eigen::MatrixBase<Derived>& a) {
+  Matrix3<typename Derived::Scalar> m;
+  m << 0, -a(2), a(1), a(2), 0, -a(0), -a(1), a(0), 0;
+  return m;
+}
+
+// The vector of a skew-symmetric matrix, the inverse of `hat`.
+template <typename Derived>
+Vector3<typename Derived::Scalar> vee(const Eigen::MatrixBase<Derived>& m) {
+  return {m(2, 1), m(0, 2), m(1, 0)};
+}
+
+// Gamma_m(x) = sum_k hat(x)^k / (k + m)!  (Bloesch et al. 2013; Hartley et al. 2020, eq. 33).
+//
+// Gamma_0 = Exp, Gamma_1 = left Jacobian, Gamma_2 appears in the position integral of a constant
+// specific force. All three share one sine and cosine.
+template <typename Scalar>
+struct Gamma {
+  Matrix3<Scalar> g0, g1, g2;
+
+  explicit Gamma(const Vector3<Scalar>& x) {
+    const Scalar a2 = x.squaredNorm();
+    // c_m: coefficients of hat(x)^m in the sums, stable for small angles.
+    Scalar c1, c2, c3, c4;
+    if (a2 < small_angle_squared()) {
+      c1 = 1 - a2 / 6 * (1 - a2 / 20);
+      c2 = (1 - a2 / 12 * (1 - a2 / 30)) / 2;
+      c3 = (1 - a2 / 20 * (1 - a2 / 42)) / 6;
+      c4 = (1 - a2 / 30 * (1 - a2 / 56)) / 24;
+    } else {
+      const Scalar a = std::sqrt(a2);
+      c1 = std::sin(a) / a;
+      c2 = (1 - std::cos(a)) / a2;
+      c3 = (1 - c1) / a2;
+      c4 = (Scalar(0.5) - c2) / a2;
+    }
+    const Matrix3<Scalar> w = hat(x);
+    const Matrix3<Scalar> ww = x * x.transpose() - a2 * Matrix3<Scalar>::Identity();
+    g0 = Matrix3<Scalar>::Identity() + c1 * w + c2 * ww;
+    g1 = Matrix3<Scalar>::Identity() + c2 * w + c3 * ww;
+    g2 = Scalar(0.5) * Matrix3<Scalar>::Identity() + c3 * w + c4 * ww;
+  }
+
+  // Below this the series above is exact to rounding: the first omitted term is a^6 / 7! of one.
+  static constexpr Scalar small_angle_squared() {
+    return sizeof(Scalar) == sizeof(float) ? Scalar(0.05) : Scalar(1e-4);
+  }
+};
+
+template <typename Scalar>
+class SO3 {
+ public:
+  static constexpr int Dof = 3;
+  using Tangent = Vector3<Scalar>;  // rotation vector [rad]
+
+  SO3() : rotation_(Matrix3<Scalar>::Identity()) {}
+  explicit SO3(const Matrix3<Scalar>& rotation) : rotation_(rotation) {}
+
+  static SO3 Exp(const Tangent& x) { return SO3(Gamma<Scalar>(x).g0); }
+
+  Tangent Log() const {
+    const Matrix3<Scalar>& r = rotation_;
+    const Tangent axis = vee(r - r.transpose()) / 2;  // sin(angle) * axis
+    const Scalar sine = axis.norm();
+    const Scalar cosine = (r.trace() - 1) / 2;
+    const Scalar angle = std::atan2(sine, cosine);
+    if (cosine < Scalar(-0.99)) {  // near half a turn the axis is in the symmetric part
+      const Matrix3<Scalar> s = (r + r.transpose()) / 2 - cosine * Matrix3<Scalar>::Identity();
+      int k = 0;
+      s.diagonal().maxCoeff(&k);
+      const Tangent direction = s.col(k).normalized();
+      return direction.dot(axis) < 0 ? Tangent(-angle * direction) : Tangent(angle * direction);
+    }
+    if (sine < Scalar(1e-4)) {
+      return axis * (1 + sine * sine / 6);
+    }
+    return axis * (angle / sine);
+  }
+
+  SO3 inverse() const { return SO3(rotation_.transpose()); }
+  SO3 operator*(const SO3& other) const { return SO3(rotation_ * other.rotation_); }
+  Vector3<Scalar> operator*(const Vector3<Scalar>& point) const { return rotation_ * point; }
+
+  Matrix3<Scalar> Adj() const { return rotation_; }
+  const Matrix3<Scalar>& matrix() const { return rotation_; }
+
+  static Matrix3<Scalar> left_jacobian(const Tangent& x) { return Gamma<Scalar>(x).g1; }
+
+  static Matrix3<Scalar> left_jacobian_inverse(const Tangent& x) {
+    const Scalar a2 = x.squaredNorm();
+    Scalar c;
+    if (a2 < Gamma<Scalar>::small_angle_squared()) {
+      c = (1 + a2 / 60 * (1 + a2 / 42)) / 12;
+    } else {
+      const Scalar a = std::sqrt(a2);
+      c = 1 / a2 - std::cos(a / 2) / (2 * a * std::sin(a / 2));
+    }
+    const Matrix3<Scalar> w = hat(x);
+    return Matrix3<Scalar>::Identity() - w / 2 + c * w * w;
+  }
+
+ private:
+  Matrix3<Scalar> rotation_;
+};
+
+// Pulls a matrix that has drifted by rounding back onto SO(3): one Newton step of the polar
+// decomposition, exact to second order in the drift.
+template <typename Scalar>
+Matrix3<Scalar> orthonormalized(const Matrix3<Scalar>& r) {
+  return Scalar(0.5) * r * (3 * Matrix3<Scalar>::Identity() - r.transpose() * r);
+}
+
+}  // namespace tensegrity
