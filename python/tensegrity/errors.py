@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 
 class InputError(ValueError):
@@ -44,3 +47,17 @@ class MissingExtraError(InputError):
             f"{feature} needs the '{extra}' extra",
             hint=f"pip install 'tensegrity-estimation[{extra}]'",
         )
+        self.feature = feature
+        self.extra = extra
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Worker processes hand their errors to the parent pickled; an exception is rebuilt from its
+        # message alone by default, which does not fit this constructor.
+        return type(self), (self.feature, self.extra)
+
+
+def did_you_mean(word: str, choices: Iterable[str]) -> str:
+    """A hint that offers the choice closest to a misspelt ``word``, or all of them."""
+    known = list(choices)
+    close = difflib.get_close_matches(word, known, n=1)
+    return f"did you mean '{close[0]}'?" if close else f"known: {', '.join(known)}"

@@ -1,0 +1,86 @@
+"""Reading text with located errors, writing directories all at once or not at all."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tensegrity.errors import InputError
+
+
+def read_text(path: Path) -> str:
+    """The content of a UTF-8 file (a byte order mark is dropped).
+
+    Raises :class:`InputError` with the file, and with the line of the first undecodable byte.
+    """
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError("no such file", file=path, hint="check the path") from None
+    except IsADirectoryError:
+        raise InputError("is a directory, a file is expected", file=path) from None
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"not text: byte 0x{content[error.start]:02x} is not UTF-8",
+            file=path,
+            line=content.count(b"\n", 0, error.start) + 1,
+            hint="is this a binary file?",
+        ) from None
+    nul = text.find("\0")
+    if nul >= 0:
+        raise InputError(
+            "not text: it contains a NUL character",
+            file=path,
+            line=text.count("\n", 0, nul) + 1,
+            hint="is this a binary file?",
+        )
+    return text
+
+
+@contextmanager
+def new_directory(path: Path, *, marker: str, overwrite: bool = False) -> Iterator[Path]:
+    """A directory that appears at ``path`` complete or not at all.
+
+    Yields an empty temporary directory next to ``path`` to write into. When the block ends it takes
+    the place of ``path``; when the block raises it is removed and ``path`` stays as it was.
+
+    A non-empty directory at ``path`` is replaced only with ``overwrite``, and only when it holds
+    the file ``marker``, so that a mistyped path never costs anybody their home directory.
+    """
+    target = path.resolve()
+    if target.exists() and not target.is_dir():
+        raise InputError("is a file, a directory is expected", file=path)
+    if target.is_dir() and any(target.iterdir()):
+        if not overwrite:
+            raise InputError(
+                "exists and is not empty",
+                file=path,
+                hint="choose another directory or ask to overwrite it",
+            )
+        if not (target / marker).is_file():
+            raise InputError(
+                f"will not be overwritten: it holds no {marker}",
+                file=path,
+                hint="choose another directory",
+            )
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        staging = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+    except OSError as error:
+        raise InputError(f"cannot be created: {error.strerror}", file=path) from None
+    try:
+        content = staging / "new"
+        content.mkdir()
+        yield content
+        if target.exists():
+            target.rename(staging / "old")
+        content.rename(target)
+    finally:
+        shutil.rmtree(staging)
