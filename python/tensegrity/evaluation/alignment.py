@@ -17,9 +17,9 @@ from scipy.spatial.transform import Rotation
 
 FloatArray = NDArray[np.float64]
 
-STILL_DISTANCE_M = 5e-3
+STILL_DISTANCE_M = 2e-3
 """A robot that is closer than this to where it started has not moved yet [m]."""
-STILL_ANGLE_RAD = np.deg2rad(0.5)
+STILL_ANGLE_RAD = np.deg2rad(0.2)
 """The same for its orientation [rad]."""
 
 

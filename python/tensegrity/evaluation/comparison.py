@@ -72,7 +72,8 @@ def compare(
     """Bring an estimate to the stamps and into the world of the truth.
 
     The truth is interpolated at the estimate's stamps (linearly, orientations on the great circle);
-    stamps further than ``MAX_TIME_DIFFERENCE_NS`` from any true sample are left out.
+    stamps outside the truth or further than ``MAX_TIME_DIFFERENCE_NS`` from any true sample are
+    left out.
 
     Raises :class:`InputError` when the recording has no ground truth or it covers no estimate.
     """
@@ -102,7 +103,7 @@ def compare(
         true_orientation[:still],
         alignment,
     )
-    cables = [tuple(cable.endcaps) for cable in sequence.robot.cables]
+    cables = [cable.endcaps for cable in sequence.robot.cables]
     endcaps_body = trajectory.endcaps_body[covered]
     true_endcaps_body = _endcaps_in_body(
         sequence.endcaps, t_ns, true_position, true_orientation, endcaps_body.shape[1]
@@ -134,16 +135,17 @@ def compare(
 
 
 def _covered(t_ns: IntArray, truth_ns: IntArray) -> BoolArray:
-    """Stamps that have a true sample within ``MAX_TIME_DIFFERENCE_NS``, (N,)."""
+    """Stamps between two true samples, the nearer within ``MAX_TIME_DIFFERENCE_NS``, (N,)."""
     after = np.searchsorted(truth_ns, t_ns).clip(1, len(truth_ns) - 1)
     nearest = np.minimum(np.abs(truth_ns[after] - t_ns), np.abs(t_ns - truth_ns[after - 1]))
-    return nearest <= MAX_TIME_DIFFERENCE_NS
+    inside = (truth_ns[0] <= t_ns) & (t_ns <= truth_ns[-1])
+    return inside & (nearest <= MAX_TIME_DIFFERENCE_NS)
 
 
 def _interpolate_poses(truth: PoseStream, t_ns: IntArray) -> tuple[FloatArray, Rotation]:
     # Relative stamps: nanoseconds since 1970 do not fit into the mantissa of a double.
     known = (truth.t_ns - truth.t_ns[0]) * 1e-9
-    wanted = ((t_ns - truth.t_ns[0]) * 1e-9).clip(known[0], known[-1])
+    wanted = (t_ns - truth.t_ns[0]) * 1e-9
     position = np.stack([np.interp(wanted, known, column) for column in truth.position.T], axis=1)
     return position, Slerp(known, Rotation.from_quat(truth.quaternion))(wanted)
 
