@@ -156,13 +156,17 @@ def key_path(location: Location) -> str:
 
 
 def merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """``base`` with ``changes`` on top: mappings are merged, everything else is replaced."""
+    """``base`` with ``changes`` on top: mappings are merged, everything else is replaced.
+
+    A section without keys (all of them commented out) changes nothing.
+    """
     merged = dict(base)
     for key, value in changes.items():
         old = merged.get(key)
-        merged[key] = (
-            merge(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
-        )
+        if isinstance(old, dict) and (value is None or isinstance(value, dict)):
+            merged[key] = merge(old, value or {})
+        else:
+            merged[key] = value
     return merged
 
 
@@ -194,22 +198,23 @@ def _explain(model: type[BaseModel], detail: ErrorDetails) -> tuple[str, str | N
     """Problem and hint for one of pydantic's errors, in the words of the model's fields."""
     location, kind = detail["loc"], detail["type"]
     if kind == "extra_forbidden":
-        owner = _inner_model(_annotation_at(model, location[:-1]))
+        owner = _inner_model(_type_at(model, location[:-1])[0])
         known = [] if owner is None else list(owner.model_fields)
         return "unknown key", did_you_mean(str(location[-1]), known)
     if kind == "value_error":
         return str(detail["ctx"]["error"]), None
     if kind == _INCONSISTENT:
         return detail["msg"], None
-    expected = describe(_annotation_at(model, location))
+    expected = describe(*_type_at(model, location))
     if kind == "missing":
         return f"missing, expected {expected}", None
     return f"expected {expected}, got {_kind(detail['input'])}", None
 
 
-def _annotation_at(model: type[BaseModel], location: Location) -> Any:
-    """The type at ``location``, with the metadata of its field."""
+def _type_at(model: type[BaseModel], location: Location) -> tuple[Any, str]:
+    """The type at ``location``, with the metadata of its field, and its unit."""
     annotation: Any = model
+    unit = ""
     for step in location:
         if isinstance(step, int):
             items = typing.get_args(_bare(annotation))
@@ -219,8 +224,8 @@ def _annotation_at(model: type[BaseModel], location: Location) -> Any:
             if owner is None or step not in owner.model_fields:
                 break
             info = owner.model_fields[step]
-            annotation = Annotated[info.annotation, info]
-    return annotation
+            annotation, unit = Annotated[info.annotation, info], unit_of(info)
+    return annotation, unit
 
 
 def _bare(annotation: Any) -> Any:
@@ -235,14 +240,11 @@ def _inner_model(annotation: Any) -> type[BaseModel] | None:
     return bare if isinstance(bare, type) and issubclass(bare, BaseModel) else None
 
 
-def describe(annotation: Any) -> str:
+def describe(annotation: Any, unit: str) -> str:
     """What a type accepts, with range and unit: ``a number > 0 [m]``."""
-    limits, unit = [], ""
+    limits = []
     for extra in typing.get_args(annotation)[1:]:
-        if not isinstance(extra, FieldInfo):
-            continue
-        unit = unit_of(extra)
-        for limit in extra.metadata:
+        for limit in extra.metadata:  # `extra` is a FieldInfo, from a model or from a type alias
             for name, sign in (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<=")):
                 if hasattr(limit, name):
                     limits.append(f"{sign} {getattr(limit, name):g}")
@@ -292,14 +294,21 @@ def _commented(model: BaseModel) -> CommentedMap:
     for name, info in type(model).model_fields.items():
         value = getattr(model, name)
         node[name] = _node(value)
-        comment = info.description or ""
-        if unit_of(info):
-            comment += f" [{unit_of(info)}]"
+        comment = _comment(info)
         if isinstance(value, BaseModel) or _is_nested(value):
             node.yaml_set_comment_before_after_key(name, before=comment)
         else:
             node.yaml_add_eol_comment(comment, name, column=_COMMENT_COLUMN)
     return node
+
+
+def _comment(info: FieldInfo) -> str:
+    """``description [unit]``, with the choices in front where there are some."""
+    bare = _bare(info.annotation)
+    choices = typing.get_args(bare) if typing.get_origin(bare) is Literal else ()
+    before = " | ".join(choices) + ": " if choices else ""
+    after = f" [{unit_of(info)}]" if unit_of(info) else ""
+    return f"{before}{info.description}{after}"
 
 
 def _is_nested(value: Any) -> bool:

@@ -28,7 +28,7 @@ class Cable(StrictModel):
     pushes."""
 
     endcaps: Pair = field("endcaps the cable joins")
-    kind: Literal["actuated", "passive"] = field("actuated (side) or passive (cross) cable")
+    kind: Literal["actuated", "passive"] = field("side cables are actuated, cross cables passive")
     stiffness: float = field("stiffness", unit="N/m", gt=0)
     damping: float = field("damping", unit="N s/m", ge=0)
     rest_length: float = field("rest length", unit="m", gt=0)

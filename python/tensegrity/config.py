@@ -1,0 +1,128 @@
+"""Configuration of the filter, in the three sections DRIFT uses: settings, priors, noises.
+
+https://github.com/UMich-CURLY/drift. The values live in the packaged profiles ``configs/*.yaml``
+alone; no field has a default here.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from tensegrity.packaged import PackagedModels
+from tensegrity.yaml_model import StrictModel, dump, field
+
+DEFAULT = "full"
+"""The profile of files that name none."""
+
+Vector3 = Annotated[tuple[float, float, float], Field(strict=False)]
+
+
+class Settings(StrictModel):
+    """Which models the filter uses, and its limits."""
+
+    method: Literal["paper", "full"] = field("the estimator of T, or the best one")
+    shape: Literal["least_squares", "tracker"] = field(
+        "endcaps from cables: anew at each sample (T eq. 15), or tracked over time"
+    )
+    spin: Literal["fixed", "estimated"] = field(
+        "angle of the shape about the base rod, which no cable observes: constant, or a state"
+    )
+    contact_point: Literal["centre", "rolling"] = field(
+        "endcaps touch as fixed points (T), or roll as spheres"
+    )
+    contact_noise: Literal["constant", "from_shape"] = field(
+        "covariance of a contact's position: contact_position_std, or that of the shape"
+    )
+    imu_sampling: Literal["interval_mean", "instantaneous"] = field(
+        "a sample is the mean since the previous stamp, or the value at its stamp"
+    )
+    static_bias_initialization: bool = field(
+        "start from the mean of the first still samples instead of priors alone"
+    )
+    init_bias_size: int = field("still samples that start the filter", unit="samples", ge=1)
+    static_gyro_limit: float = field("still: deviation of the gyro below", unit="rad/s", gt=0)
+    static_accel_limit: float = field(
+        "still: deviation of the accelerometer below", unit="m/s^2", gt=0
+    )
+    max_imu_gap: float = field("longer gaps between IMU samples widen the state", unit="s", gt=0)
+    max_latency: float = field("measurements older than this are dropped", unit="s", ge=0)
+    chi_square_gate: float = field(
+        "probability mass of innovations that are accepted, 0: all", ge=0, lt=1
+    )
+    gravity: float = field("acceleration of gravity, downward", unit="m/s^2", gt=0)
+
+
+class Priors(StrictModel):
+    """State and standard deviations at the start."""
+
+    orientation_std: float = field("orientation", unit="rad", ge=0)
+    velocity_std: float = field("velocity", unit="m/s", ge=0)
+    position_std: float = field("position", unit="m", ge=0)
+    gyroscope_bias: Vector3 = field("gyroscope bias, IMU frame", unit="rad/s")
+    gyroscope_bias_std: float = field("gyroscope bias", unit="rad/s", ge=0)
+    accelerometer_bias: Vector3 = field("accelerometer bias, IMU frame", unit="m/s^2")
+    accelerometer_bias_std: float = field("accelerometer bias", unit="m/s^2", ge=0)
+    spin_std: float = field("spin", unit="rad", ge=0)
+
+
+class Noises(StrictModel):
+    """Standard deviations of measurements and of what drives the state."""
+
+    gyroscope_std: float = field("gyroscope, one sample", unit="rad/s", gt=0)
+    accelerometer_std: float = field("accelerometer, one sample", unit="m/s^2", gt=0)
+    gyroscope_bias_std: float = field("random walk", unit="rad/s/sqrt(s)", ge=0)
+    accelerometer_bias_std: float = field("random walk", unit="m/s^2/sqrt(s)", ge=0)
+    cable_std: float = field("cable length, one sample", unit="m", gt=0)
+    contact_std: float = field("random walk of a contact point", unit="m/sqrt(s)", ge=0)
+    contact_position_std: float = field(
+        "position of a contact, with contact_noise: constant", unit="m", gt=0
+    )
+    spin_std: float = field("random walk, with spin: estimated", unit="rad/sqrt(s)", ge=0)
+    shape_std_rest: float = field(
+        "random walk of the shape at rest, with shape: tracker", unit="m/sqrt(s)", gt=0
+    )
+    shape_std_moving: float = field(
+        "random walk of the shape in motion, with shape: tracker", unit="m/sqrt(s)", gt=0
+    )
+
+
+class FilterConfig(StrictModel):
+    """Everything that can be set in the estimator."""
+
+    settings: Settings = field("models and limits")
+    priors: Priors = field("start of the filter")
+    noises: Noises = field("standard deviations")
+
+    @classmethod
+    def load(cls, name_or_path: str | Path = DEFAULT) -> FilterConfig:
+        """A packaged profile by name, or a YAML file.
+
+        A file may state only what differs from the profile it names with ``base``. Without that
+        key it builds on the profile of its own ``settings.method``, or else on ``full``.
+
+        Raises :class:`InputError` with file, line and key.
+        """
+        return _PROFILES.load(name_or_path)
+
+    def to_yaml(self) -> str:
+        """This configuration with description and unit of every key; loads back to an equal one."""
+        return dump(self)
+
+
+def packaged() -> list[str]:
+    """Names of the profiles that come with the package."""
+    return _PROFILES.names()
+
+
+def _default_base(content: dict[str, Any]) -> str:
+    settings = content.get("settings")
+    method = settings.get("method") if isinstance(settings, dict) else None
+    return method if method in packaged() else DEFAULT
+
+
+_PROFILES = PackagedModels(
+    FilterConfig, Path(__file__).parent / "configs", "profile", _default_base
+)
