@@ -1,0 +1,74 @@
+// Everything that can be set about the prism's estimator, in one plain struct.
+//
+// The defaults are T's method ("paper"). Python fills this struct from YAML, where every field has
+// the same name (python/tensegrity/config.py).
+#pragma once
+
+#include <cstdint>
+
+#include "tensegrity/types.hpp"
+
+namespace tensegrity {
+
+enum class ShapeMethod : std::uint8_t {
+  kLeastSquares,  // T eq. 15a for every sample, warm-started
+  kTracker,       // a filter over the shape that knows its fold
+};
+enum class SpinMethod : std::uint8_t {
+  kFixed,      // phi stays what the static start found
+  kEstimated,  // phi is a filter state
+};
+enum class ContactPoint : std::uint8_t {
+  kCentre,   // the endcap's centre stands still while in contact (T)
+  kRolling,  // the endcap is a sphere that rolls without slip
+};
+enum class ContactNoise : std::uint8_t {
+  kConstant,   // one standard deviation for all endcaps (T)
+  kFromShape,  // the joint covariance of the shape reconstruction
+};
+enum class ImuSampling : std::uint8_t {
+  kIntervalMean,   // a sample is the mean over the interval that ends at its stamp
+  kInstantaneous,  // a sample is the value at its stamp
+};
+
+template <typename Scalar = double>
+struct PrismConfig {
+  // settings
+  ShapeMethod shape = ShapeMethod::kLeastSquares;
+  SpinMethod spin = SpinMethod::kFixed;
+  ContactPoint contact_point = ContactPoint::kCentre;
+  ContactNoise contact_noise = ContactNoise::kConstant;
+  ImuSampling imu_sampling = ImuSampling::kIntervalMean;
+  bool static_bias_initialization = true;
+  int init_bias_size = 400;                 // samples that have to be still in a row
+  Scalar static_gyro_limit = Scalar(0.02);  // standard deviation while still [rad/s]
+  Scalar static_accel_limit = Scalar(0.3);  // standard deviation while still [m/s^2]
+  Scalar max_imu_gap = Scalar(0.05);        // a longer step counts as missing samples [s]
+  Scalar max_latency = Scalar(0.05);        // cables and contacts older than this are dropped [s]
+  Scalar chi_square_gate = Scalar(0);       // probability of the contact gate; 0: no gate
+  Scalar gravity = Scalar(9.81);            // [m/s^2]
+
+  // priors: standard deviations at the start
+  Scalar orientation_std = Scalar(0.5);                          // roll and pitch [rad]
+  Scalar velocity_std = Scalar(0.05);                            // [m/s]
+  Scalar position_std = Scalar(0);                               // [m]
+  Vector3<Scalar> gyroscope_bias = Vector3<Scalar>::Zero();      // [rad/s]
+  Scalar gyroscope_bias_std = Scalar(0.02);                      // [rad/s]
+  Vector3<Scalar> accelerometer_bias = Vector3<Scalar>::Zero();  // [m/s^2]
+  Scalar accelerometer_bias_std = Scalar(0.05);                  // [m/s^2]
+  Scalar spin_prior_std = Scalar(0.1);                           // [rad]
+
+  // noises: standard deviations
+  Scalar gyroscope_std = Scalar(0.002);            // of one sample [rad/s]
+  Scalar accelerometer_std = Scalar(0.043);        // of one sample [m/s^2]
+  Scalar gyroscope_bias_walk = Scalar(0.001);      // [rad/s/sqrt(s)]
+  Scalar accelerometer_bias_walk = Scalar(0.001);  // [m/s^2/sqrt(s)]
+  Scalar cable_std = Scalar(0.002);                // [m]
+  Scalar contact_std = Scalar(0.05);               // random walk of a contact point [m/sqrt(s)]
+  Scalar contact_position_std = Scalar(0.02);      // contact kinematics, white part [m]
+  Scalar spin_walk = Scalar(0.05);                 // [rad/sqrt(s)]
+  Scalar shape_std_rest = Scalar(0.001);           // shape at rest [m/sqrt(s)]
+  Scalar shape_std_moving = Scalar(0.1);           // shape while rolling or falling [m/sqrt(s)]
+};
+
+}  // namespace tensegrity

@@ -1,0 +1,53 @@
+// Measurements that came before the IMU sample that reaches their stamp.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "tensegrity/robot/prism.hpp"
+
+namespace tensegrity {
+
+using Nanoseconds = std::int64_t;
+
+template <typename Scalar>
+struct PendingMeasurement {
+  enum class Kind : std::uint8_t { kContacts, kCables };  // at equal stamps contacts go first
+  Nanoseconds t = 0;
+  Kind kind = Kind::kContacts;
+  CableLengths<Scalar> lengths = CableLengths<Scalar>::Zero();
+  std::array<bool, 6> flags{};
+
+  bool before(const PendingMeasurement& other) const {
+    return t != other.t ? t < other.t : kind < other.kind;
+  }
+};
+
+// Sorted by stamp, bounded. When it is full (the IMU has been silent) the oldest entry goes.
+template <typename Scalar, int Capacity = 16>
+class PendingQueue {
+ public:
+  using Item = PendingMeasurement<Scalar>;
+
+  // Returns false when the oldest entry had to go to make room.
+  bool push(const Item& item) {
+    const bool full = size_ == Capacity;
+    if (full) pop();
+    int i = size_++;
+    for (; i > 0 && item.before(items_[i - 1]); --i) items_[i] = items_[i - 1];
+    items_[i] = item;
+    return !full;
+  }
+  bool empty() const { return size_ == 0; }
+  const Item& front() const { return items_[0]; }
+  void pop() {
+    for (int i = 1; i < size_; ++i) items_[i - 1] = items_[i];
+    --size_;
+  }
+
+ private:
+  std::array<Item, Capacity> items_{};
+  int size_ = 0;
+};
+
+}  // namespace tensegrity

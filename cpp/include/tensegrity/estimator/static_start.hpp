@@ -1,0 +1,65 @@
+// Standing still, detected: the mean of a window in which the IMU's scatter and its means are what
+// sensor noise and bias priors explain.
+#pragma once
+
+#include "tensegrity/types.hpp"
+
+namespace tensegrity {
+
+template <typename Scalar>
+class StaticStart {
+ public:
+  struct Limits {
+    int samples;                 // a window is this many samples in a row
+    Scalar gyro_scatter;         // largest standard deviation of any gyro axis [rad/s]
+    Scalar accel_scatter;        // largest standard deviation of any accelerometer axis [m/s^2]
+    Scalar gyro_mean;            // largest norm of (mean rate - prior bias) [rad/s]
+    Scalar accel_mean;           // largest | |mean specific force - prior bias| - g | [m/s^2]
+    Scalar gravity;              // [m/s^2]
+    Vector3<Scalar> gyro_bias;   // prior mean [rad/s]
+    Vector3<Scalar> accel_bias;  // prior mean [m/s^2]
+  };
+
+  explicit StaticStart(const Limits& limits) : limits_(limits) { clear(); }
+
+  // Adds one sample; true when a whole window was still. A window that was not is forgotten.
+  bool add(const Vector3<Scalar>& gyro, const Vector3<Scalar>& accel) {
+    gyro_.add(gyro);
+    accel_.add(accel);
+    if (gyro_.count < limits_.samples) return false;
+    const bool still =
+        gyro_.variance().maxCoeff() <= limits_.gyro_scatter * limits_.gyro_scatter &&
+        accel_.variance().maxCoeff() <= limits_.accel_scatter * limits_.accel_scatter &&
+        (gyro_.mean - limits_.gyro_bias).norm() <= limits_.gyro_mean &&
+        std::abs((accel_.mean - limits_.accel_bias).norm() - limits_.gravity) <= limits_.accel_mean;
+    if (!still) clear();
+    return still;
+  }
+
+  void clear() { gyro_ = accel_ = Welford{}; }
+
+  int samples() const { return gyro_.count; }
+  const Vector3<Scalar>& mean_gyro() const { return gyro_.mean; }
+  const Vector3<Scalar>& mean_accel() const { return accel_.mean; }
+
+ private:
+  // Running mean and variance (Welford 1962): no buffer, no cancellation.
+  struct Welford {
+    int count = 0;
+    Vector3<Scalar> mean = Vector3<Scalar>::Zero();
+    Vector3<Scalar> sum_squares = Vector3<Scalar>::Zero();
+
+    void add(const Vector3<Scalar>& x) {
+      ++count;
+      const Vector3<Scalar> before = x - mean;
+      mean += before / Scalar(count);
+      sum_squares += before.cwiseProduct(x - mean);
+    }
+    Vector3<Scalar> variance() const { return sum_squares / Scalar(count > 1 ? count - 1 : 1); }
+  };
+
+  Limits limits_;
+  Welford gyro_, accel_;
+};
+
+}  // namespace tensegrity

@@ -1,0 +1,114 @@
+// What the filter knows: a mean on SE_{2+N}(3) x R^m and the covariance of its right-invariant
+// error.
+//
+// Mean:  X = (R, v, p, d_1 .. d_N) in SE_{2+N}(3) (T eq. 2), body in world, and the Euclidean part
+//        theta = (b_g, b_a, extra). `extra` belongs to the measurement model: the loosely coupled
+//        filter keeps the spin angle phi there, a tightly coupled one the shape and its rates.
+// Error: Xbar X^-1 = exp(xi) and thetabar - theta, so that
+//        e = (xi_R, xi_v, xi_p, zeta_bg, zeta_ba, zeta_extra, xi_d1 .. xi_dN).
+// Contact points come last: adding and removing one moves nothing else.
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "tensegrity/math/so3.hpp"
+
+namespace tensegrity::inekf {
+
+template <typename Scalar_, int Extra_, int MaxAnchors_ = 6>
+struct Belief {
+  using Scalar = Scalar_;
+  static constexpr int Extra = Extra_;
+  static constexpr int MaxAnchors = MaxAnchors_;
+
+  // Where each block of the error starts.
+  static constexpr int kRotation = 0;
+  static constexpr int kVelocity = 3;
+  static constexpr int kPosition = 6;
+  static constexpr int kGyroBias = 9;
+  static constexpr int kAccelBias = 12;
+  static constexpr int kExtra = 15;
+  static constexpr int kAnchors = 15 + Extra;
+  static constexpr int MaxDim = kAnchors + 3 * MaxAnchors;
+
+  // Only the leading dim() x dim() block is meaningful.
+  using Covariance = Matrix<Scalar, MaxDim>;
+  // Capacity-bounded, so that products of active blocks never touch the heap.
+  using ErrorVector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1, 0, MaxDim, 1>;
+
+  Matrix3<Scalar> rotation = Matrix3<Scalar>::Identity();  // R, body to world
+  Vector3<Scalar> velocity = Vector3<Scalar>::Zero();      // v, world [m/s]
+  Vector3<Scalar> position = Vector3<Scalar>::Zero();      // p, world [m]
+  Vector3<Scalar> gyro_bias = Vector3<Scalar>::Zero();     // b_g, body [rad/s]
+  Vector3<Scalar> accel_bias = Vector3<Scalar>::Zero();    // b_a, body [m/s^2]
+  Vector<Scalar, Extra> extra = Vector<Scalar, Extra>::Zero();
+  Matrix<Scalar, 3, MaxAnchors> anchors = Matrix<Scalar, 3, MaxAnchors>::Zero();  // d_i, world [m]
+  std::array<int, MaxAnchors> anchor_ids{};  // which endcap each anchor belongs to
+  int anchor_count = 0;
+  Covariance covariance = Covariance::Zero();
+
+  int dim() const { return kAnchors + 3 * anchor_count; }
+  static constexpr int anchor_index(int slot) { return kAnchors + 3 * slot; }
+
+  // Slot of an endcap's anchor, or -1.
+  int find(int id) const {
+    for (int slot = 0; slot < anchor_count; ++slot) {
+      if (anchor_ids[slot] == id) return slot;
+    }
+    return -1;
+  }
+
+  // X <- Exp(-xi) X, theta <- theta - zeta: takes an estimated error e out of the mean (T eq. 13).
+  template <typename Derived>
+  void retract(const Eigen::MatrixBase<Derived>& e) {
+    const Gamma<Scalar> gamma(-e.template segment<3>(kRotation));
+    const auto move = [&](auto&& column, int at) {
+      column = (gamma.g0 * column - gamma.g1 * e.template segment<3>(at)).eval();
+    };
+    move(velocity, kVelocity);
+    move(position, kPosition);
+    for (int slot = 0; slot < anchor_count; ++slot) move(anchors.col(slot), anchor_index(slot));
+    rotation = orthonormalized<Scalar>(gamma.g0 * rotation);
+    gyro_bias -= e.template segment<3>(kGyroBias);
+    accel_bias -= e.template segment<3>(kAccelBias);
+    extra -= e.template segment<Extra>(kExtra);
+  }
+
+  // Rounding makes the two triangles differ; the mean of them is the covariance.
+  void symmetrize() {
+    const int n = dim();
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < j; ++i) {
+        const Scalar mean = (covariance(i, j) + covariance(j, i)) / 2;
+        covariance(i, j) = covariance(j, i) = mean;
+      }
+    }
+  }
+
+  bool finite() const {
+    const int n = dim();
+    return rotation.allFinite() && velocity.allFinite() && position.allFinite() &&
+           gyro_bias.allFinite() && accel_bias.allFinite() && extra.allFinite() &&
+           anchors.leftCols(anchor_count).allFinite() && covariance.topLeftCorner(n, n).allFinite();
+  }
+
+  // Covariance of the position error p - pbar in the world [m^2]. The invariant error mixes in the
+  // rotation: dp = xi_p - p x xi_R.
+  Matrix3<Scalar> position_covariance() const { return column_covariance(position, kPosition); }
+  Matrix3<Scalar> velocity_covariance() const { return column_covariance(velocity, kVelocity); }
+  // Covariance of the rotation error in the world frame [rad^2].
+  Matrix3<Scalar> rotation_covariance() const {
+    return covariance.template block<3, 3>(kRotation, kRotation);
+  }
+
+ private:
+  Matrix3<Scalar> column_covariance(const Vector3<Scalar>& column, int at) const {
+    const Matrix3<Scalar> c = hat(column);
+    const Matrix3<Scalar> cross = covariance.template block<3, 3>(at, kRotation) * c.transpose();
+    return covariance.template block<3, 3>(at, at) - cross - cross.transpose() +
+           c * rotation_covariance() * c.transpose();
+  }
+};
+
+}  // namespace tensegrity::inekf
