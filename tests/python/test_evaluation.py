@@ -308,8 +308,8 @@ def test_truth_at_other_stamps_is_interpolated() -> None:
     comparison = compare(exact, sparse)
     metrics = measure(comparison, exact.runtime_s)
     assert len(comparison.t_s) == len(exact.t_ns) - 1  # the last true pose is gone
-    # Elsewhere than where the robot sets off the path bends by less than 0.01 mm within 20 ms; there
-    # it has one corner, 5 mm off the chord.
+    # The path has one corner, 5 mm off the chord, where the robot sets off; elsewhere it bends by
+    # less than 0.01 mm within 20 ms.
     assert metrics.ate_rmse_m < 1.1 * 5e-3 / np.sqrt(len(exact.t_ns))
     assert metrics.endcap_rmse_m is not None
     assert metrics.endcap_rmse_m < 1e-3
