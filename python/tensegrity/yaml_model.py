@@ -312,6 +312,9 @@ def _comment(info: FieldInfo) -> str:
 
 
 def _is_nested(value: Any) -> bool:
+    """Whether ``value`` takes more than the line of its key."""
+    if isinstance(value, dict):
+        return True
     return isinstance(value, tuple) and any(isinstance(item, (tuple, BaseModel)) for item in value)
 
 
