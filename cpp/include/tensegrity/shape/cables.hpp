@@ -1,0 +1,102 @@
+// Cable lengths of a shape and their first and second derivatives with respect to the tangent.
+#pragma once
+
+#include "tensegrity/shape/rods.hpp"
+
+namespace tensegrity::shape {
+
+// Distances of the endcap centres, order of `kPrismCables` [m].
+template <typename Scalar>
+CableLengths<Scalar> cable_lengths(const Endcaps<Scalar>& q) {
+  CableLengths<Scalar> lengths;
+  for (int k = 0; k < 9; ++k) {
+    const Cable cable = kPrismCables[static_cast<std::size_t>(k)];
+    lengths[k] = (q.col(cable.from) - q.col(cable.to)).norm();
+  }
+  return lengths;
+}
+
+namespace detail {
+
+// Unit vector from a cable's `to` to its `from` endcap; zero for a cable of no length, whose
+// derivative does not exist.
+template <typename Scalar>
+Vector3<Scalar> cable_direction(const Endcaps<Scalar>& q, Cable cable, Scalar& length) {
+  const Vector3<Scalar> span = q.col(cable.from) - q.col(cable.to);
+  length = span.norm();
+  return length > 0 ? Vector3<Scalar>(span / length) : Vector3<Scalar>::Zero();
+}
+
+}  // namespace detail
+
+// J = dl/dtangent, 9 x 10 [m/m]. Turning the free rods about body z is its exact null vector.
+template <typename Scalar>
+LengthJacobian<Scalar> length_jacobian(const Rods<Scalar>& rods) {
+  const Endcaps<Scalar> q = rods.endcaps();
+  LengthJacobian<Scalar> jacobian = LengthJacobian<Scalar>::Zero();
+  for (int row = 0; row < 9; ++row) {
+    const Cable cable = kPrismCables[static_cast<std::size_t>(row)];
+    Scalar length;
+    const Vector3<Scalar> n = detail::cable_direction(q, cable, length);
+    const auto add_end = [&](int endcap, Scalar sign) {
+      const int k = free_rod(endcap);
+      if (k < 0) return;
+      jacobian.template block<1, 3>(row, 5 * k) += sign * n.transpose();
+      jacobian.template block<1, 2>(row, 5 * k + 3) +=
+          sign * Scalar(rod_side(endcap)) * (n.transpose() * rods.rod(k).across());
+    };
+    add_end(cable.from, Scalar(1));
+    add_end(cable.to, Scalar(-1));
+  }
+  return jacobian;
+}
+
+// Sum over the cables of weight * d2l/dtangent2, 10 x 10 [1/m]: the second-order part of a
+// least-squares Hessian (weights = residuals) or the stress stiffness (weights = a self-stress).
+template <typename Scalar>
+TangentMatrix<Scalar> weighted_length_hessian(const Rods<Scalar>& rods,
+                                              const Vector<Scalar, 9>& weights) {
+  const Endcaps<Scalar> q = rods.endcaps();
+  TangentMatrix<Scalar> hessian = TangentMatrix<Scalar>::Zero();
+  for (int row = 0; row < 9; ++row) {
+    const Cable cable = kPrismCables[static_cast<std::size_t>(row)];
+    Scalar length;
+    const Vector3<Scalar> n = detail::cable_direction(q, cable, length);
+    if (length <= 0) continue;
+    // A cable curves as the part of its motion across itself ...
+    const Matrix3<Scalar> across =
+        weights[row] / length * (Matrix3<Scalar>::Identity() - n * n.transpose());
+    const auto add_block = [&](int a, int b, Scalar sign) {
+      const int ka = free_rod(a);
+      const int kb = free_rod(b);
+      if (ka < 0 || kb < 0) return;
+      const Scalar sa = Scalar(rod_side(a));
+      const Scalar sb = Scalar(rod_side(b));
+      const auto ba = rods.rod(ka).across();
+      const auto bb = rods.rod(kb).across();
+      const Matrix<Scalar, 3, 2> across_bb = sb * (across * bb);
+      hessian.template block<3, 3>(5 * ka, 5 * kb) += sign * across;
+      hessian.template block<3, 2>(5 * ka, 5 * kb + 3) += sign * across_bb;
+      hessian.template block<2, 3>(5 * ka + 3, 5 * kb) += (sign * sa) * (ba.transpose() * across);
+      hessian.template block<2, 2>(5 * ka + 3, 5 * kb + 3) +=
+          (sign * sa) * (ba.transpose() * across_bb);
+    };
+    add_block(cable.from, cable.from, Scalar(1));
+    add_block(cable.to, cable.to, Scalar(1));
+    add_block(cable.from, cable.to, Scalar(-1));
+    add_block(cable.to, cable.from, Scalar(-1));
+    // ... and as the endcaps do, which move on circles about their rods' centres.
+    const auto add_circle = [&](int endcap, Scalar sign) {
+      const int k = free_rod(endcap);
+      if (k < 0) return;
+      const Scalar inward = -sign * Scalar(rod_side(endcap)) * n.dot(rods.rod(k).direction());
+      hessian.template block<2, 2>(5 * k + 3, 5 * k + 3).diagonal().array() +=
+          weights[row] * inward / rods.half_length();
+    };
+    add_circle(cable.from, Scalar(1));
+    add_circle(cable.to, Scalar(-1));
+  }
+  return hessian;
+}
+
+}  // namespace tensegrity::shape

@@ -1,0 +1,144 @@
+// The shape of the prism as two free rods (T §V).
+//
+// The base rod r01 is the body frame, so a shape is where rods r23 and r45 are: a centre c and a
+// unit direction u (from the odd to the even endcap) each. That is 10 degrees of freedom, against
+// 9 cable lengths. Every derivative here is with respect to the tangent vector
+//
+//   delta = (dc23, L/2 du23, dc45, L/2 du45)   dimensions 3 + 2 + 3 + 2, all in metres,
+//
+// where du is written in an orthonormal basis of the plane across the rod. With that scaling the
+// endcaps of a free rod move by dc +- (L/2 du), and the tangent metric is Euclidean.
+//
+// All vectors are in the body frame, all lengths in metres.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+
+#include "tensegrity/robot/prism.hpp"
+#include "tensegrity/types.hpp"
+
+namespace tensegrity::shape {
+
+inline constexpr int kTangent = 10;
+
+template <typename Scalar>
+using Tangent = Vector<Scalar, kTangent>;
+template <typename Scalar>
+using TangentMatrix = Matrix<Scalar, kTangent>;
+template <typename Scalar>
+using EndcapJacobian = Matrix<Scalar, 18, kTangent>;  // dq/dtangent, q stacked by endcap
+template <typename Scalar>
+using LengthJacobian = Matrix<Scalar, 9, kTangent>;  // dl/dtangent
+
+// Free rod an endcap belongs to (0: r23, 1: r45), or -1 for the base rod.
+constexpr int free_rod(int endcap) { return endcap / 2 - 1; }
+// +1 for the even end of a rod, -1 for the odd one.
+constexpr int rod_side(int endcap) { return endcap % 2 == 0 ? 1 : -1; }
+
+template <typename Scalar>
+class Rods {
+ public:
+  struct Rod {
+    Vector3<Scalar> centre;
+    // Orthonormal and right-handed: two directions across the rod, then its direction u. The frame
+    // travels with the rod, so that a tangent covariance keeps its meaning from step to step.
+    Matrix3<Scalar> frame;
+
+    auto direction() const { return frame.col(2); }
+    auto across() const { return frame.template leftCols<2>(); }
+  };
+
+  // The endcaps need to be in the body frame; a rod length that differs from the prism's is
+  // corrected about the rod's centre. Precondition: q2 != q3 and q4 != q5.
+  Rods(const Prism<Scalar>& prism, const Endcaps<Scalar>& endcaps)
+      : half_length_(prism.rod_length / 2), base_{prism.endcap0(), prism.endcap1()} {
+    for (int k = 0; k < 2; ++k) {
+      const Vector3<Scalar> even = endcaps.col(2 * k + 2);
+      const Vector3<Scalar> odd = endcaps.col(2 * k + 3);
+      rods_[k].centre = (even + odd) / 2;
+      const Vector3<Scalar> u = (even - odd).normalized();
+      // The axis least aligned with u gives a well-conditioned plane across the rod.
+      int axis = 0;
+      u.cwiseAbs().minCoeff(&axis);
+      set_direction(rods_[k], u, Vector3<Scalar>::Unit(axis));
+    }
+  }
+
+  const Rod& rod(int k) const { return rods_[k]; }
+  Scalar half_length() const { return half_length_; }
+
+  // Endcap centres in the body frame, one per column [m].
+  Endcaps<Scalar> endcaps() const {
+    Endcaps<Scalar> q;
+    q.col(0) = base_[0];
+    q.col(1) = base_[1];
+    for (int k = 0; k < 2; ++k) {
+      q.col(2 * k + 2) = rods_[k].centre + half_length_ * rods_[k].direction();
+      q.col(2 * k + 3) = rods_[k].centre - half_length_ * rods_[k].direction();
+    }
+    return q;
+  }
+
+  // Moves the shape by a tangent vector [m]. The direction is moved in the plane across the rod and
+  // normalised: this agrees with the great circle to second order, so that the derivatives below
+  // are exact to second order as well.
+  void retract(const Tangent<Scalar>& delta) {
+    for (int k = 0; k < 2; ++k) {
+      Rod& rod = rods_[k];
+      rod.centre += delta.template segment<3>(5 * k);
+      const Vector3<Scalar> u =
+          rod.direction() + rod.across() * delta.template segment<2>(5 * k + 3) / half_length_;
+      set_direction(rod, u.normalized(), rod.frame.col(0));
+    }
+  }
+
+  // Turns both free rods about the body z axis [rad]. Changes no cable length.
+  void rotate_about_z(Scalar angle) {
+    const Matrix3<Scalar> rotation = rotation_about_z(angle);
+    for (Rod& rod : rods_) {
+      rod.centre = rotation * rod.centre;
+      rod.frame = rotation * rod.frame;
+    }
+  }
+
+  // Mirror image, y -> -y. Changes no cable length, but turns every mutual moment around.
+  void reflect() {
+    for (Rod& rod : rods_) {
+      rod.centre.y() = -rod.centre.y();
+      rod.frame.row(1) = -rod.frame.row(1);
+      rod.frame.col(1) = -rod.frame.col(1);  // back to a right-handed frame
+    }
+  }
+
+  // D = dq/dtangent, 18 x 10; the rows of endcap i are 3i..3i+2, the first six are zero.
+  EndcapJacobian<Scalar> endcap_jacobian() const {
+    EndcapJacobian<Scalar> jacobian = EndcapJacobian<Scalar>::Zero();
+    for (int endcap = 2; endcap < 6; ++endcap) {
+      const int k = free_rod(endcap);
+      jacobian.template block<3, 3>(3 * endcap, 5 * k).setIdentity();
+      jacobian.template block<3, 2>(3 * endcap, 5 * k + 3) =
+          Scalar(rod_side(endcap)) * rods_[k].across();
+    }
+    return jacobian;
+  }
+
+  static Matrix3<Scalar> rotation_about_z(Scalar angle) {
+    return Eigen::AngleAxis<Scalar>(angle, Vector3<Scalar>::UnitZ()).toRotationMatrix();
+  }
+
+ private:
+  // `hint` is any vector that is not parallel to u; its part across u becomes the first axis.
+  static void set_direction(Rod& rod, const Vector3<Scalar>& u, const Vector3<Scalar>& hint) {
+    const Vector3<Scalar> first = (hint - u.dot(hint) * u).normalized();
+    rod.frame.col(0) = first;
+    rod.frame.col(1) = u.cross(first);
+    rod.frame.col(2) = u;
+  }
+
+  Scalar half_length_;
+  std::array<Vector3<Scalar>, 2> base_;  // q0, q1
+  std::array<Rod, 2> rods_;
+};
+
+}  // namespace tensegrity::shape

@@ -1,0 +1,302 @@
+// Cable lengths -> endcaps by nonlinear least squares (T eq. 15a), in real time.
+//
+// Minimises the sum of squared length residuals over the ten tangent unknowns of `Rods`; rod
+// lengths and the base rod are met by construction. Newton's method with the exact Hessian where
+// that is positive definite, else Gauss-Newton, both with Levenberg-Marquardt damping: close to the
+// fold (fold.hpp) noisy lengths often have no exact solution, and there Gauss-Newton alone does not
+// converge. The spin about z is held by a unit stiffness and removed by the Procrustes gauge.
+//
+// Chirality (constraints.hpp) is not a constraint of the iteration but checked at its end: a
+// mirrored shape is reflected, a shape with crossed rods is started anew.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tensegrity/robot/prism.hpp"
+#include "tensegrity/shape/cables.hpp"
+#include "tensegrity/shape/constraints.hpp"
+#include "tensegrity/shape/fold.hpp"
+#include "tensegrity/shape/gauge.hpp"
+#include "tensegrity/shape/rods.hpp"
+#include "tensegrity/types.hpp"
+
+namespace tensegrity::shape {
+
+template <typename Scalar>
+struct SolverOptions {
+  int max_iterations = 50;  // per start
+  // Length of the last tangent step [m].
+  Scalar tolerance = std::is_same_v<Scalar, float> ? Scalar(1e-5) : Scalar(1e-7);
+};
+
+// kOk when every length is finite and a prism could have it, else why not.
+template <typename Scalar>
+Status check_lengths(const CableLengths<Scalar>& lengths, Scalar rod_length) {
+  if (!lengths.allFinite()) return Status::kNotFinite;
+  // Two endcaps of a net whose rods all touch are at most three rods apart.
+  if ((lengths.array() <= 0).any() || (lengths.array() > 3 * rod_length).any()) {
+    return Status::kOutOfRange;
+  }
+  return Status::kOk;
+}
+
+template <typename Scalar>
+class Solver {
+ public:
+  using Options = SolverOptions<Scalar>;
+
+  explicit Solver(const Prism<Scalar>& prism, const Options& options = Options())
+      : prism_(prism),
+        options_(options),
+        reference_(prism.undeformed()),
+        rods_(prism, reference_),
+        endcaps_(reference_) {}
+
+  // Lengths [m] -> shape. The first call after construction or `reset` starts cold, from a fixed
+  // set of shapes, and takes the branch of positive `fold` if the lengths have one there; later
+  // calls start from the last solution and stay on its branch.
+  //   kOk             solved (read `cost` to judge how well the lengths fit together)
+  //   kNotConverged   the iteration limit was reached; the best iterate is kept
+  //   kWrongChirality only shapes with crossing rods fit; the shape is unchanged
+  //   kNotFinite, kOutOfRange  bad lengths; the shape is unchanged
+  Status solve(const CableLengths<Scalar>& lengths) {
+    const Status input = check_lengths(lengths, prism_.rod_length);
+    if (input != Status::kOk) return input;
+    Solution best{rods_, std::numeric_limits<Scalar>::max(), 0, false};
+    if (warm_) best = minimise(rods_, lengths);
+    int iterations = best.iterations;
+    if (!warm_ || handedness(best.rods.endcaps(), prism_.moment_sign()) != Handedness::kRight) {
+      best = solve_cold(lengths, iterations);
+      if (handedness(best.rods.endcaps(), prism_.moment_sign()) != Handedness::kRight) {
+        return Status::kWrongChirality;
+      }
+    }
+    rods_ = best.rods;
+    rods_.rotate_about_z(-spin_angle(rods_.endcaps(), reference_));
+    endcaps_ = rods_.endcaps();
+    cost_ = best.cost;
+    iterations_ = iterations;
+    warm_ = true;
+    return best.converged ? Status::kOk : Status::kNotConverged;
+  }
+
+  // Forgets the last solution: the next `solve` starts cold.
+  void reset() {
+    rods_ = Rods<Scalar>(prism_, reference_);
+    endcaps_ = reference_;
+    cost_ = 0;
+    iterations_ = 0;
+    warm_ = false;
+  }
+
+  // Body frame, Procrustes gauge of the undeformed robot [m]; the undeformed robot before the first
+  // solution.
+  const Endcaps<Scalar>& endcaps() const { return endcaps_; }
+  const Rods<Scalar>& rods() const { return rods_; }
+  // Sum of squared length residuals, T eq. 15a [m^2].
+  Scalar cost() const { return cost_; }
+  int iterations() const { return iterations_; }
+
+  // Covariance of the stacked endcaps (18 x 18, Procrustes gauge) [m^2] for independent cable
+  // errors of standard deviation `cable_std` [m]: sigma^2 J_p J_p', J_p = D [J; t']^-1 [I; 0].
+  //
+  // Along the mechanism the linear formula sigma^2 / s^2 has no limit as s goes to zero on the
+  // fold, where the error in truth grows with sqrt(sigma). It is replaced by sigma^2 / (s^2 +
+  // sqrt(pi/2) |kappa| sigma): with kappa x^2 / 2 = n, n normal, the variance of x is 2 E|n| /
+  // |kappa| sigma = sigma / (sqrt(pi/2) |kappa|) times one, which is the limit.
+  Status covariance(Scalar cable_std, Matrix<Scalar, 18>& out) const {
+    TangentMatrix<Scalar> tangent;
+    const Status status = tangent_covariance(cable_std, tangent);
+    if (used(status)) out = to_endcaps(tangent);
+    return status;
+  }
+
+  // The same with a prior on the shape: independent errors of standard deviation `prior_std` [m] in
+  // every tangent direction, as the previous solution and a bound on the motion since give it.
+  Status covariance(Scalar cable_std, Scalar prior_std, Matrix<Scalar, 18>& out) const {
+    if (!warm_) return Status::kNotInitialized;
+    for (const Scalar value : {cable_std, prior_std}) {
+      const Status input = check_std(value);
+      if (input != Status::kOk) return input;
+    }
+    const LengthJacobian<Scalar> jacobian = length_jacobian(rods_);
+    TangentMatrix<Scalar> information = jacobian.transpose() * jacobian / (cable_std * cable_std);
+    information.diagonal().array() += 1 / (prior_std * prior_std);
+    const Eigen::LLT<TangentMatrix<Scalar>> factor(information);
+    out = to_endcaps(factor.solve(TangentMatrix<Scalar>::Identity()));
+    return Status::kOk;
+  }
+
+  // Covariance without prior in the tangent of `rods` [m^2], with no uncertainty of the spin.
+  Status tangent_covariance(Scalar cable_std, TangentMatrix<Scalar>& out) const {
+    if (!warm_) return Status::kNotInitialized;
+    const Status input = check_std(cable_std);
+    if (input != Status::kOk) return input;
+    const FoldAnalysis<Scalar> analysis = analyse_fold(rods_);
+    const Scalar sqrt_half_pi = Scalar(1.2533141373155003);
+    Vector<Scalar, 9> squared = analysis.singular_values.cwiseAbs2();
+    squared[8] += sqrt_half_pi * std::abs(analysis.curvature) * cable_std;
+    const Vector<Scalar, 9> variances = cable_std * cable_std * squared.cwiseInverse();
+    out = analysis.motions * variances.asDiagonal() * analysis.motions.transpose();
+    return Status::kOk;
+  }
+
+ private:
+  struct Solution {
+    Rods<Scalar> rods;
+    Scalar cost;
+    int iterations;
+    bool converged;
+  };
+
+  static Status check_std(Scalar value) {
+    if (!std::isfinite(value)) return Status::kNotFinite;
+    return value > 0 ? Status::kOk : Status::kOutOfRange;
+  }
+
+  // One descent from `start` to a local minimum.
+  Solution minimise(const Rods<Scalar>& start, const CableLengths<Scalar>& lengths) const {
+    const Scalar initial_damping = Scalar(1e-3);
+    const Scalar max_step =
+        Scalar(0.3) * prism_.rod_length;  // beyond it no model of second order holds
+    Solution now{start, 0, 0, false};
+    Vector<Scalar, 9> residual = cable_lengths(now.rods.endcaps()) - lengths;
+    now.cost = residual.squaredNorm();
+    // Rounding of one residual: a cost below nine of its squares is zero.
+    const Scalar rounding = 4 * std::numeric_limits<Scalar>::epsilon() * prism_.rod_length;
+    Scalar damping = 0;
+    TangentMatrix<Scalar> first_order;
+    TangentMatrix<Scalar> second_order;
+    Tangent<Scalar> gradient;
+    bool stale = true;
+    while (now.iterations < options_.max_iterations) {
+      ++now.iterations;
+      if (stale) {
+        const LengthJacobian<Scalar> jacobian = length_jacobian(now.rods);
+        const Tangent<Scalar> t = spin_tangent(now.rods);
+        gradient.noalias() = jacobian.transpose() * residual;
+        first_order.noalias() = jacobian.transpose() * jacobian;
+        first_order.noalias() += t * t.transpose();
+        second_order = weighted_length_hessian(now.rods, residual);
+        stale = false;
+      }
+      TangentMatrix<Scalar> hessian = first_order + second_order;
+      hessian.diagonal().array() += damping;
+      Eigen::LLT<TangentMatrix<Scalar>> factor(hessian);
+      if (factor.info() != Eigen::Success) {
+        damping = std::max(damping, initial_damping);
+        hessian = first_order;
+        hessian.diagonal().array() += damping;
+        factor.compute(hessian);
+      }
+      Tangent<Scalar> step = -factor.solve(gradient);
+      const Scalar length = step.norm();
+      if (!std::isfinite(length)) {
+        damping = std::max(10 * damping, initial_damping);
+        continue;
+      }
+      if (length > max_step) step *= max_step / length;
+      Rods<Scalar> trial = now.rods;
+      trial.retract(step);
+      const Vector<Scalar, 9> trial_residual = cable_lengths(trial.endcaps()) - lengths;
+      const Scalar trial_cost = trial_residual.squaredNorm();
+      const bool better = trial_cost < now.cost;
+      if (better) {
+        now.rods = trial;
+        now.cost = trial_cost;
+        residual = trial_residual;
+        damping = damping > initial_damping / 100 ? damping / 10 : Scalar(0);
+        stale = true;
+      } else {
+        damping = std::max(10 * damping, initial_damping);
+      }
+      if (length < options_.tolerance || now.cost < 9 * rounding * rounding) {
+        now.converged = true;
+        break;
+      }
+    }
+    return now;
+  }
+
+  // Best of the fixed starts that ends in a shape without crossing rods, on the branch of positive
+  // fold where there is one. The first start suffices for all but strongly deformed shapes.
+  Solution solve_cold(const CableLengths<Scalar>& lengths, int& iterations) const {
+    // A cost as from independent errors of 1 % of a rod is no reason to look for a better minimum.
+    const Scalar good_cost = 9 * Scalar(1e-4) * prism_.rod_length * prism_.rod_length;
+    Solution best{rods_, std::numeric_limits<Scalar>::max(), 0, false};
+    bool found = false;
+    for (int k = 0; k < kStarts; ++k) {
+      Solution candidate = minimise(start(k), lengths);
+      iterations += candidate.iterations;
+      Handedness hand = handedness(candidate.rods.endcaps(), prism_.moment_sign());
+      if (hand == Handedness::kMirrored) {
+        candidate.rods.reflect();
+        hand = Handedness::kRight;
+      }
+      if (hand != Handedness::kRight || (found && candidate.cost >= best.cost)) {
+        if (!found && k == 0) best = candidate;
+        continue;
+      }
+      best = candidate;
+      found = true;
+      if (best.cost < good_cost) break;
+    }
+    return found ? to_positive_fold(best, lengths, iterations) : best;
+  }
+
+  // Crosses the fold from the branch of larger twist, if that is possible at no higher cost.
+  Solution to_positive_fold(const Solution& solution, const CableLengths<Scalar>& lengths,
+                            int& iterations) const {
+    const Scalar sign = prism_.moment_sign();
+    if (fold(solution.rods, sign) >= 0) return solution;
+    // Along the mechanism the lengths change as s x + kappa x^2 / 2: the other root.
+    const FoldAnalysis<Scalar> analysis = analyse_fold(solution.rods);
+    if (!(std::abs(analysis.curvature) > 0)) return solution;
+    const Scalar limit = Scalar(0.2) * prism_.rod_length;
+    const Scalar root = -2 * analysis.smallest() / analysis.curvature;
+    Rods<Scalar> across = solution.rods;
+    across.retract(std::clamp(root, -limit, limit) * analysis.mechanism());
+    const Solution other = minimise(across, lengths);
+    iterations += other.iterations;
+    const Scalar rounding = 4 * std::numeric_limits<Scalar>::epsilon() * prism_.rod_length;
+    const bool as_good = other.cost <= solution.cost + 9 * rounding * rounding;
+    const bool valid = handedness(other.rods.endcaps(), sign) == Handedness::kRight;
+    return as_good && valid && fold(other.rods, sign) > 0 ? other : solution;
+  }
+
+  // The undeformed robot, then the same with both free rods tilted, which reaches what a rolling
+  // robot can look like.
+  Rods<Scalar> start(int k) const {
+    Rods<Scalar> rods(prism_, reference_);
+    if (k == 0) return rods;
+    const Scalar tilt = Scalar(0.25) * prism_.rod_length;
+    const int pattern = k - 1;
+    Tangent<Scalar> delta = Tangent<Scalar>::Zero();
+    delta[3] = pattern & 1 ? tilt : -tilt;
+    delta[4] = pattern & 2 ? tilt : -tilt;
+    delta[8] = pattern & 4 ? tilt : -tilt;
+    delta[9] = pattern & 8 ? tilt : -tilt;
+    rods.retract(delta);
+    return rods;
+  }
+
+  Matrix<Scalar, 18> to_endcaps(const TangentMatrix<Scalar>& tangent) const {
+    return endcap_covariance(rods_, tangent, reference_);
+  }
+
+  static constexpr int kStarts = 17;
+
+  Prism<Scalar> prism_;
+  Options options_;
+  Endcaps<Scalar> reference_;  // the undeformed robot
+  Rods<Scalar> rods_;
+  Endcaps<Scalar> endcaps_;
+  Scalar cost_ = 0;
+  int iterations_ = 0;
+  bool warm_ = false;
+};
+
+}  // namespace tensegrity::shape
