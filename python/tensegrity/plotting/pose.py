@@ -75,7 +75,16 @@ def draw(runs: Mapping[str, Comparison]) -> Figure:
 
 def euler_angles(orientation: Rotation) -> FloatArray:
     """Roll, pitch, yaw (N, 3) [rad] with R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    return np.asarray(orientation.as_euler("ZYX")[:, ::-1])
+    r = orientation.as_matrix()
+    # SciPy's as_euler would warn at every pitch of 90 degrees, which a rolling robot passes.
+    return np.stack(
+        [
+            np.arctan2(r[:, 2, 1], r[:, 2, 2]),
+            np.arcsin(np.clip(-r[:, 2, 0], -1.0, 1.0)),
+            np.arctan2(r[:, 1, 0], r[:, 0, 0]),
+        ],
+        axis=1,
+    )
 
 
 def euler_sigma(orientation: Rotation, covariance: FloatArray) -> FloatArray:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,8 @@ from tensegrity.errors import MissingExtraError
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
+
+    from tensegrity.evaluation import Comparison
 
 TRUTH_COLOUR = "black"
 # Okabe and Ito's palette, which people with any colour vision tell apart (without its yellow, which
@@ -54,10 +57,11 @@ def new_figure(width: float, height: float) -> Iterator[Figure]:
         yield Figure(figsize=(width, height), layout="constrained")
 
 
-def colours(labels: Iterable[str]) -> dict[str, str]:
-    """A colour for every run; runs labelled by their method have the method's."""
-    further = iter(_FURTHER_COLOURS * 8)
-    return {label: _METHOD_COLOURS.get(label) or next(further) for label in labels}
+def colours(runs: Mapping[str, Comparison]) -> dict[str, str]:
+    """A colour for every run by label; the first run of a method has the method's."""
+    methods = dict(_METHOD_COLOURS)
+    further = itertools.cycle(_FURTHER_COLOURS)
+    return {label: methods.pop(run.method, None) or next(further) for label, run in runs.items()}
 
 
 def legend_above(figure: Figure, handles: Iterable[Artist]) -> None:
@@ -68,5 +72,8 @@ def legend_above(figure: Figure, handles: Iterable[Artist]) -> None:
 
 def save(figure: Figure, path: Path) -> Path:
     """Write the figure as PNG and return its path."""
-    figure.savefig(path, format="png")
+    import matplotlib
+
+    with matplotlib.rc_context(_SETTINGS):  # some settings count only when the file is drawn
+        figure.savefig(path, format="png")
     return path
