@@ -73,14 +73,20 @@ class Noises(StrictModel):
 
     gyroscope_std: float = field("gyroscope, one sample", unit="rad/s", gt=0)
     accelerometer_std: float = field("accelerometer, one sample", unit="m/s^2", gt=0)
-    gyroscope_bias_std: float = field("random walk", unit="rad/s/sqrt(s)", ge=0)
-    accelerometer_bias_std: float = field("random walk", unit="m/s^2/sqrt(s)", ge=0)
+    gyroscope_bias_std: float = field(
+        "random walk of the gyroscope bias", unit="rad/s/sqrt(s)", ge=0
+    )
+    accelerometer_bias_std: float = field(
+        "random walk of the accelerometer bias", unit="m/s^2/sqrt(s)", ge=0
+    )
     cable_std: float = field("cable length, one sample", unit="m", gt=0)
     contact_std: float = field("random walk of a contact point", unit="m/sqrt(s)", ge=0)
     contact_position_std: float = field(
         "position of a contact, with contact_noise: constant", unit="m", gt=0
     )
-    spin_std: float = field("random walk, with spin: estimated", unit="rad/sqrt(s)", ge=0)
+    spin_std: float = field(
+        "random walk of the spin, with spin: estimated", unit="rad/sqrt(s)", ge=0
+    )
     shape_std_rest: float = field(
         "random walk of the shape at rest, with shape: tracker", unit="m/sqrt(s)", gt=0
     )

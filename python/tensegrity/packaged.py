@@ -27,6 +27,7 @@ class PackagedModels(Generic[Model]):
         self._folder = folder
         self._kind = kind
         self._default_base = default_base
+        self._loaded: dict[str, Model] = {}  # models are immutable: sharing them is safe
 
     def names(self) -> list[str]:
         """Names of the packaged descriptions."""
@@ -49,8 +50,10 @@ class PackagedModels(Generic[Model]):
         return self._from_package(text)
 
     def _from_package(self, name: str) -> Model:
-        document = Document(self._folder / f"{name}.yaml")
-        return document.model(self._model, document.mapping())
+        if name not in self._loaded:
+            document = Document(self._folder / f"{name}.yaml")
+            self._loaded[name] = document.model(self._model, document.mapping())
+        return self._loaded[name]
 
     def _from_file(self, path: Path) -> Model:
         document = Document(

@@ -1,0 +1,51 @@
+"""Every kind of broken input gives one error that names file, line and field."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from malformed import MALFORMED_CONFIGS, MALFORMED_SEQUENCES, MalformedSequence, MalformedYaml
+from tensegrity.config import FilterConfig
+from tensegrity.errors import InputError
+from tensegrity.sequence import read
+
+
+def check(error: InputError, file: Path, kind: MalformedSequence | MalformedYaml) -> None:
+    message = str(error)
+    assert error.file == file
+    assert kind.says in message
+    assert "\n" not in message
+    if kind.line is not None:
+        assert error.line == kind.line
+        assert message.startswith(f"{file}:{kind.line}: ")
+    if kind.field is not None:
+        assert error.field == kind.field
+        assert kind.field in message
+
+
+def test_the_sequence_is_fine_before_it_is_broken(sequence_path: Path) -> None:
+    assert len(read(sequence_path).imu.t_ns) == 201
+
+
+@pytest.mark.parametrize("kind", MALFORMED_SEQUENCES, ids=lambda kind: kind.name)
+def test_sequence(kind: MalformedSequence, sequence_path: Path) -> None:
+    kind.apply(sequence_path)
+    with pytest.raises(InputError) as caught:
+        read(sequence_path)
+    check(caught.value, sequence_path / kind.file, kind)
+
+
+@pytest.mark.parametrize("kind", MALFORMED_CONFIGS, ids=lambda kind: kind.name)
+def test_config(kind: MalformedYaml, tmp_path: Path) -> None:
+    file = tmp_path / "filter.yaml"
+    file.write_text(kind.text)
+    with pytest.raises(InputError) as caught:
+        FilterConfig.load(file)
+    check(caught.value, file, kind)
+
+
+def test_kinds_are_many_and_distinct() -> None:
+    assert len({kind.name for kind in MALFORMED_SEQUENCES}) == len(MALFORMED_SEQUENCES) >= 30
+    assert len({kind.name for kind in MALFORMED_CONFIGS}) == len(MALFORMED_CONFIGS)
