@@ -61,7 +61,7 @@ def colours(runs: Mapping[str, Comparison]) -> dict[str, str]:
     """A colour for every run by label; the first run of a method has the method's."""
     methods = dict(_METHOD_COLOURS)
     further = itertools.cycle(_FURTHER_COLOURS)
-    return {label: methods.pop(run.method, None) or next(further) for label, run in runs.items()}
+    return {label: methods.pop(run.method, "") or next(further) for label, run in runs.items()}
 
 
 def legend_above(figure: Figure, handles: Iterable[Artist]) -> None:
