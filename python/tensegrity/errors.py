@@ -36,7 +36,8 @@ class InputError(ValueError):
             where += f":{self.line}"
         parts = [part for part in (where, self.field and f"field '{self.field}'") if part]
         text = ": ".join([*parts, self.problem])
-        return text if self.hint is None else f"{text} ({self.hint})"
+        text = text if self.hint is None else f"{text} ({self.hint})"
+        return text.replace("\r", "\\r").replace("\n", "\\n")  # damaged input can hold line ends
 
 
 class MissingExtraError(InputError):
@@ -54,6 +55,12 @@ class MissingExtraError(InputError):
         # Worker processes hand their errors to the parent pickled; an exception is rebuilt from its
         # message alone by default, which does not fit this constructor.
         return type(self), (self.feature, self.extra)
+
+
+def quoted(value: object) -> str:
+    """``value`` in quotes for a message, shortened when it is long."""
+    text = str(value)
+    return f"'{text}'" if len(text) <= 40 else f"'{text[:37]}...'"
 
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:

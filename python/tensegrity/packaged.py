@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Generic
 
-from tensegrity.errors import InputError, did_you_mean
+from tensegrity.errors import InputError, did_you_mean, quoted
 from tensegrity.yaml_model import Document, Location, Model, merge
 
 
@@ -77,4 +77,4 @@ class PackagedModels(Generic[Model]):
         return str(name)
 
     def _unknown(self, name: Any) -> str:
-        return f"no packaged {self._kind} is called '{name}'"
+        return f"no packaged {self._kind} is called {quoted(name)}"

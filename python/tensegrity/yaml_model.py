@@ -19,7 +19,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from tensegrity.errors import InputError, did_you_mean
+from tensegrity.errors import InputError, did_you_mean, quoted
 from tensegrity.files import read_text
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -191,7 +191,7 @@ def _kind(value: Any) -> str:
         return f"a list of {len(value)}"
     if isinstance(value, bool):
         return "true" if value else "false"
-    return f"'{value}'" if isinstance(value, str) else str(value)
+    return quoted(value) if isinstance(value, str) else str(value)
 
 
 def _explain(model: type[BaseModel], detail: ErrorDetails) -> tuple[str, str | None]:

@@ -373,6 +373,22 @@ MALFORMED_SEQUENCES = [
         field="t",
     ),
     MalformedSequence(
+        "stamp of a pose is not a number",
+        "groundtruth.tum",
+        set_cell("groundtruth.tum", 3, 0, "nan", " "),
+        "[s], got 'nan'",
+        line=3,
+        field="t",
+    ),
+    MalformedSequence(
+        "stamp of a pose is too large",
+        "groundtruth.tum",
+        set_cell("groundtruth.tum", 3, 0, "1E1000000000", " "),
+        "[s], got '1E1000000000'",
+        line=3,
+        field="t",
+    ),
+    MalformedSequence(
         "another clock",
         "cables.csv",
         shift_stamps("cables.csv", 1_700_000_000_000_000_000),

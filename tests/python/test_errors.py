@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tensegrity.errors import InputError, MissingExtraError, did_you_mean
+from tensegrity.errors import InputError, MissingExtraError, did_you_mean, quoted
 from tensegrity.files import new_directory, read_text
 
 
@@ -15,6 +15,11 @@ def test_input_error_names_file_line_field_and_hint() -> None:
     error = InputError("is odd", file="a.csv", line=3, field="x", hint="make it even")
     assert str(error) == "a.csv:3: field 'x': is odd (make it even)"
     assert str(InputError("is odd")) == "is odd"
+
+
+def test_input_error_is_one_line_whatever_the_input_holds() -> None:
+    error = InputError(f"got {quoted('a' * 30 + chr(10) + 'b' * 30)}", field="x\ny")
+    assert str(error) == f"field 'x\\ny': got '{'a' * 30}\\n{'b' * 6}...'"
 
 
 @pytest.mark.parametrize(

@@ -10,13 +10,13 @@ import io
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tensegrity.errors import InputError, did_you_mean
+from tensegrity.errors import InputError, did_you_mean, quoted
 from tensegrity.files import read_text
 
 FloatArray = NDArray[np.float64]
@@ -68,9 +68,12 @@ def _nanoseconds(text: str) -> int:
 def _seconds(text: str) -> int:
     # Decimal, because a double holds the seconds since 1970 to only 0.2 us.
     try:
-        return int(Decimal(text.replace("_", "?")).scaleb(9).to_integral_value())
-    except (InvalidOperation, OverflowError) as error:
+        nanoseconds = Decimal(text.replace("_", "?")).scaleb(9)
+        if abs(nanoseconds) > _INT64.max:
+            raise ValueError(text)
+    except ArithmeticError as error:
         raise ValueError(text) from error
+    return int(nanoseconds.to_integral_value())
 
 
 _CSV = _Dialect(",", None, True, "t_ns", "a whole number [ns]", _nanoseconds, str)
@@ -246,11 +249,12 @@ def _unreadable(
             stamp = None
         if stamp is None or not _INT64.min <= stamp <= _INT64.max:
             return error(
-                f"expected {dialect.stamp_expected}, got '{cells[0].strip()}'", dialect.stamp_name
+                f"expected {dialect.stamp_expected}, got {quoted(cells[0].strip())}",
+                dialect.stamp_name,
             )
         for cell, column in zip(cells[1:], columns, strict=True):
             if not _is_number(cell):
-                return error(f"expected {column.expected}, got '{cell.strip()}'", column.name)
+                return error(f"expected {column.expected}, got {quoted(cell.strip())}", column.name)
     return InputError("is not a table of numbers", file=file)
 
 
