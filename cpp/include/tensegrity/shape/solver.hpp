@@ -21,6 +21,7 @@
 #include "tensegrity/shape/fold.hpp"
 #include "tensegrity/shape/gauge.hpp"
 #include "tensegrity/shape/rods.hpp"
+#include "tensegrity/shape/starts.hpp"
 #include "tensegrity/types.hpp"
 
 namespace tensegrity::shape {
@@ -228,8 +229,8 @@ class Solver {
     const Scalar good_cost = 9 * Scalar(1e-4) * prism_.rod_length * prism_.rod_length;
     Solution best{rods_, std::numeric_limits<Scalar>::max(), 0, false};
     bool found = false;
-    for (int k = 0; k < kStarts; ++k) {
-      Solution candidate = minimise(start(k), lengths);
+    for (int k = 0; k < kColdStarts; ++k) {
+      Solution candidate = minimise(cold_start(prism_, k), lengths);
       iterations += candidate.iterations;
       Handedness hand = handedness(candidate.rods.endcaps(), prism_.moment_sign());
       if (hand == Handedness::kMirrored) {
@@ -267,27 +268,9 @@ class Solver {
     return as_good && valid && fold(other.rods, sign) > 0 ? other : solution;
   }
 
-  // The undeformed robot, then the same with both free rods tilted, which reaches what a rolling
-  // robot can look like.
-  Rods<Scalar> start(int k) const {
-    Rods<Scalar> rods(prism_, reference_);
-    if (k == 0) return rods;
-    const Scalar tilt = Scalar(0.25) * prism_.rod_length;
-    const int pattern = k - 1;
-    Tangent<Scalar> delta = Tangent<Scalar>::Zero();
-    delta[3] = pattern & 1 ? tilt : -tilt;
-    delta[4] = pattern & 2 ? tilt : -tilt;
-    delta[8] = pattern & 4 ? tilt : -tilt;
-    delta[9] = pattern & 8 ? tilt : -tilt;
-    rods.retract(delta);
-    return rods;
-  }
-
   Matrix<Scalar, 18> to_endcaps(const TangentMatrix<Scalar>& tangent) const {
     return endcap_covariance(rods_, tangent, reference_);
   }
-
-  static constexpr int kStarts = 17;
 
   Prism<Scalar> prism_;
   Options options_;
