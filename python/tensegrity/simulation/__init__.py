@@ -1,0 +1,7 @@
+"""The prism in MuJoCo: :func:`simulate` a manoeuvre and get its recording with the truth."""
+
+from tensegrity.simulation.manoeuvres import Manoeuvre
+from tensegrity.simulation.options import SimulationOptions
+from tensegrity.simulation.simulate import simulate
+
+__all__ = ["Manoeuvre", "SimulationOptions", "simulate"]

@@ -1,0 +1,102 @@
+"""What a simulated recording should look like."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError
+
+from tensegrity.errors import InputError
+from tensegrity.yaml_model import StrictModel, field, unit_of
+
+ImuSampling = Literal["interval_mean", "instantaneous"]
+
+
+class SimulationOptions(StrictModel):
+    """World, robot variants, motion and sensors of a simulated recording.
+
+    The defaults are T's simulation: flat ground and the noise of T Table I. Unknown or impossible
+    values raise :class:`InputError` with field, range and unit.
+    """
+
+    seed: int = field("the same seed gives identical recordings", default=0, ge=0)
+    randomize: bool = field(
+        "draw initial yaw, IMU mounting, friction (10 %), gait gain and speed (3 %) from the seed",
+        default=True,
+    )
+
+    path_length: float | None = field(
+        "horizontal path of the centre of mass; none: that of the manoeuvre",
+        unit="m",
+        default=None,
+        gt=0,
+    )
+    cable_speed: float = field(
+        "fastest change of a cable's rest length: the speed of the gait",
+        unit="m/s",
+        default=0.13,
+        gt=0,
+        le=1,
+    )
+    still_start: float = field("standing still at the start", unit="s", default=4.0, ge=0)
+    still_end: float = field("standing still at the end", unit="s", default=3.0, ge=0)
+
+    friction: float = field("friction coefficient of the ground", default=0.9, gt=0, le=3)
+    slope: float = field("inclination of the ground", unit="deg", default=0.0, ge=0, le=20)
+    slope_direction: float = field(
+        "direction in which the ground rises, from the world's x axis", unit="deg", default=0.0
+    )
+    floor_time_constant: float = field(
+        "MuJoCo's contact time constant: smaller is stiffer", unit="s", default=0.02, ge=0.002, le=1
+    )
+
+    mirrored: bool = field("simulate the mirror image of the robot", default=False)
+    endcap_radius: float | None = field(
+        "none: that of the robot", unit="m", default=None, gt=0, le=0.2
+    )
+    cable_attachment_offset: float | None = field(
+        "from the rod's axis; none: that of the robot", unit="m", default=None, ge=0, le=0.2
+    )
+
+    imu_sampling: ImuSampling = field(
+        "what an IMU sample is: the mean since the previous one, or the value at its stamp",
+        default="interval_mean",
+    )
+    rod_imus: bool = field("record IMUs on the other rods too", default=False)
+    gyro_noise: float = field("standard deviation", unit="rad/s", default=0.002, ge=0)
+    accel_noise: float = field("standard deviation", unit="m/s^2", default=0.043, ge=0)
+    gyro_bias_walk: float = field(
+        "standard deviation of the random walk after 1 s", unit="rad/s", default=0.001, ge=0
+    )
+    accel_bias_walk: float = field(
+        "standard deviation of the random walk after 1 s", unit="m/s^2", default=0.001, ge=0
+    )
+    cable_noise: float = field("standard deviation", unit="m", default=0.002, ge=0)
+    cable_offsets: Annotated[tuple[float, ...], Field(strict=False)] | None = field(
+        "constant errors, one per cable; none: no errors", unit="m", default=None
+    )
+    contact_false_rate: float = field(
+        "share of samples in the air reported", default=0.0, ge=0, le=1
+    )
+    contact_missing_rate: float = field(
+        "share of samples on the ground reported as free", default=0.0, ge=0, le=1
+    )
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise _input_error(error) from None
+
+
+def _input_error(error: ValidationError) -> InputError:
+    """The first problem, in the words of the field."""
+    detail = error.errors()[0]
+    name = str(detail["loc"][0])
+    info = SimulationOptions.model_fields.get(name)
+    if info is None:
+        known = ", ".join(SimulationOptions.model_fields)
+        return InputError("unknown simulation option", field=name, hint=f"known: {known}")
+    unit = unit_of(info)
+    expected = detail["msg"][0].lower() + detail["msg"][1:] + (f" [{unit}]" if unit else "")
+    return InputError(f"{expected}, got {detail['input']!r}", field=name, hint=info.description)
