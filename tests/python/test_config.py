@@ -142,3 +142,13 @@ def test_the_printed_configuration_loads_back_equal(
     file = tmp_path_factory.mktemp("config") / "filter.yaml"
     file.write_text(config.to_yaml())
     assert FilterConfig.load(file) == config
+
+
+def test_every_key_is_documented_with_its_unit(repo_root: Path) -> None:
+    lines = (repo_root / "docs" / "configuration.md").read_text().splitlines()
+    for title, section in sections():
+        start = lines.index(f"## {title}")
+        end = next((i for i in range(start + 1, len(lines)) if lines[i][:3] == "## "), len(lines))
+        rows = [line.split("|")[1:3] for line in lines[start:end] if line.startswith("| `")]
+        documented = {key.strip(" `"): unit.strip() for key, unit in rows}
+        assert documented == {n: unit_of(i) for n, i in section.model_fields.items()}

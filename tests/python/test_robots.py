@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tensegrity import robots
 from tensegrity.errors import InputError
 from tensegrity.robots import PRISM_CABLES, Robot
-from tensegrity.yaml_model import dump
+from tensegrity.yaml_model import dump, unit_of
 
 
 def mutual_moments(endcaps: np.ndarray) -> list[float]:
@@ -152,3 +152,11 @@ def test_written_robots_read_back_equal(
 def test_robots_of_the_shared_recordings(shared_data: Path) -> None:
     for name in ("forward", "right"):
         assert robots.load(shared_data / "prism3" / name / "robot.yaml") == robots.load("prism3")
+
+
+def test_every_key_is_documented_with_its_unit(repo_root: Path) -> None:
+    text = (repo_root / "docs" / "files.md").read_text()
+    section = text[text.index("## Robot") : text.index("## Run")]
+    rows = [line.split("|")[1:3] for line in section.splitlines() if line.startswith("| `")]
+    documented = {key.strip(" `"): unit.strip() for key, unit in rows}
+    assert documented == {name: unit_of(info) for name, info in Robot.model_fields.items()}
