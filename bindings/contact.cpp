@@ -34,7 +34,7 @@ void bind_contact(py::module_& m) {
                          "defaults are the fitted ones.")
       .def(py::init<>())
       .def_readwrite("intercept", &Parameters::intercept,
-                     "log odds of the lowest, second, third and any higher endcap, (4,)")
+                     "log odds of the lowest, the second, and the third and higher endcaps, (3,)")
       .def_readwrite("height_weight", &Parameters::height_weight,
                      "log odds per height above the lowest endcap in rod lengths")
       .def_readwrite("share_weight", &Parameters::share_weight, "log odds per share of the weight")

@@ -7,10 +7,11 @@
 //
 //   logit p(loaded | geometry) = intercept[rank] + height_weight h / L + share_weight s
 //
-// with h the height above the lowest endcap, L the rod length and s the clamped share. Contact is
-// a two-state Markov process with rates in 1/s; the geometry's evidence is added to the predicted
-// log odds, weighted by the part of it that is new. Errors of the estimated positions persist for
-// about `evidence_time`, so that a sample after dt adds 1 - exp(-dt / evidence_time) of what an
+// with h the height above the lowest endcap, L the rod length and s the share, which is the least
+// one for endcaps higher than the three (these have the third's intercept). Contact is a two-state
+// Markov process with rates in 1/s; the geometry's evidence is added to the predicted log odds,
+// weighted by the part of it that is new. Errors of the estimated positions persist for about
+// `evidence_time`, so that a sample after dt adds 1 - exp(-dt / evidence_time) of what an
 // independent one would: the decision does not depend on the rate of the cable sensors.
 #pragma once
 
@@ -27,7 +28,7 @@ namespace tensegrity::contact {
 
 template <typename Scalar>
 struct DetectorParameters {
-  std::array<Scalar, 4> intercept{{Scalar(3), Scalar(1), Scalar(0), Scalar(-4)}};
+  std::array<Scalar, 3> intercept{{Scalar(3), Scalar(1), Scalar(0)}};  // by rank, lowest first
   Scalar height_weight = Scalar(-40);
   Scalar share_weight = Scalar(12);
   Scalar touch_down_rate = Scalar(0.5);  // [1/s]
@@ -56,10 +57,11 @@ class Detector {
   // `world`: endcap centres in any frame with z up [m]; `dt`: time since the last update [s].
   // Input that is not finite, or a negative dt, keeps the last decision.
   const Flags& update(const Endcaps<Scalar>& world, Scalar dt) {
+    if (!world.allFinite() || !(dt >= 0)) return loaded_;
     const Probabilities geometry = evidence(world);
-    const bool finite = std::all_of(geometry.begin(), geometry.end(),
-                                    [](Scalar logit) { return std::isfinite(logit); });
-    if (!finite || !(dt >= 0)) return loaded_;
+    const bool overflow = !std::all_of(geometry.begin(), geometry.end(),
+                                       [](Scalar logit) { return std::isfinite(logit); });
+    if (overflow) return loaded_;
     const Scalar rate = parameters_.touch_down_rate + parameters_.lift_off_rate;
     const Scalar memory = std::exp(-rate * dt);
     const Scalar news = fresh_ ? Scalar(1) : 1 - std::exp(-dt / parameters_.evidence_time);
@@ -77,7 +79,7 @@ class Detector {
   const Probabilities& probability() const { return probability_; }
 
  private:
-  // Log odds of "loaded" from one geometry, without history. Not finite if `world` is not.
+  // Log odds of "loaded" from one geometry, without history. Not finite where products overflow.
   Probabilities evidence(const Endcaps<Scalar>& world) const {
     const std::array<int, 6> order = lowest_first(world);
     const Vector3<Scalar> share = load_share(world, order);
@@ -85,17 +87,19 @@ class Detector {
     Probabilities result;
     for (std::size_t rank = 0; rank < order.size(); ++rank) {
       const Scalar height = (world(2, order[rank]) - lowest) / rod_length_;
-      Scalar logit = parameters_.intercept[std::min<std::size_t>(rank, 3)] +
-                     parameters_.height_weight * height;
-      if (rank < 3) logit += parameters_.share_weight * clamp(share[Eigen::Index(rank)]);
-      result[std::size_t(order[rank])] = logit;
+      result[std::size_t(order[rank])] =
+          parameters_.intercept[std::min<std::size_t>(rank, 2)] +
+          parameters_.height_weight * height +
+          parameters_.share_weight * (rank < 3 ? bounded(share[Eigen::Index(rank)]) : kLeastShare);
     }
     return result;
   }
 
-  // NaN passes through, unlike with std::clamp in the other order of comparisons.
-  static Scalar clamp(Scalar share) {
-    return share < Scalar(-0.2) ? Scalar(-0.2) : share > Scalar(0.4) ? Scalar(0.4) : share;
+  // Beyond these a share says no more: it comes from a triangle that is nearly a line. NaN stays.
+  static constexpr Scalar kLeastShare = Scalar(-0.5);
+  static constexpr Scalar kGreatestShare = Scalar(1);
+  static Scalar bounded(Scalar share) {
+    return share < kLeastShare ? kLeastShare : share > kGreatestShare ? kGreatestShare : share;
   }
 
   Scalar stationary() const {
