@@ -79,8 +79,14 @@ def new_directory(path: Path, *, marker: str, overwrite: bool = False) -> Iterat
         content = staging / "new"
         content.mkdir()
         yield content
-        if target.exists():
-            target.rename(staging / "old")
-        content.rename(target)
+        old = staging / "old"
+        try:
+            if target.exists():
+                target.rename(old)
+            content.rename(target)
+        except BaseException:
+            if old.exists() and not target.exists():
+                old.rename(target)
+            raise
     finally:
         shutil.rmtree(staging)

@@ -18,6 +18,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.reader import ReaderError
 
 from tensegrity.errors import InputError, did_you_mean, quoted
 from tensegrity.files import read_text
@@ -62,20 +63,27 @@ class Document:
         self.file = file
         self._root = root
         text = read_text(file)
+
+        def invalid(problem: str, line: int | None, hint: str | None = None) -> InputError:
+            return InputError(f"not valid YAML: {problem}", file=file, line=line, hint=hint)
+
         try:
             self._tree = YAML(typ="rt").load(text)
+            self.content = _plain(self._tree)
         except MarkedYAMLError as error:
             mark = error.problem_mark or error.context_mark
-            raise InputError(
-                f"not valid YAML: {error.problem or error.context}",
-                file=file,
-                line=None if mark is None else mark.line + 1,
-                hint="look for a missing colon, quote, bracket or a wrong indentation",
+            raise invalid(
+                str(error.problem or error.context),
+                None if mark is None else mark.line + 1,
+                "look for a missing colon, quote, bracket or a wrong indentation",
             ) from None
+        except ReaderError as error:
+            line = text.count("\n", 0, error.position) + 1
+            raise invalid(f"character {error.character!r} is not allowed", line) from None
+        except RecursionError:
+            raise invalid("nested too deeply", None) from None
         except (YAMLError, ValueError) as error:
-            first_line = str(error).splitlines()[0]
-            raise InputError(f"not valid YAML: {first_line}", file=file) from None
-        self.content = _plain(self._tree)
+            raise invalid(str(error).split("\n", 1)[0], None) from None
 
     def mapping(self) -> dict[str, Any]:
         """The content, which has to be a mapping (an empty file is an empty mapping)."""
@@ -119,16 +127,16 @@ class Document:
             hint=hint,
         )
 
-    def model(self, model: type[Model], values: dict[str, Any], below: Location = ()) -> Model:
+    def model(self, model: type[Model], values: dict[str, Any]) -> Model:
         """Validate ``values`` (this document's, perhaps completed from defaults).
 
-        ``below`` is the place of ``values`` in this document. Raises :class:`InputError` for the
-        first problem in the order of the file, misspelt keys before all others.
+        Raises :class:`InputError` for the first problem in the order of the file, misspelt keys
+        before all others.
         """
         try:
             return model.model_validate(values)
         except ValidationError as error:
-            problems = [(self._place(below, detail), detail) for detail in error.errors()]
+            problems = [(self._place(detail), detail) for detail in error.errors()]
         # A misspelt key comes first: it explains the missing one.
         location, detail = min(
             problems,
@@ -137,9 +145,9 @@ class Document:
         problem, hint = _explain(model, detail)
         raise self.error(problem, location, hint)
 
-    def _place(self, below: Location, detail: ErrorDetails) -> Location:
+    def _place(self, detail: ErrorDetails) -> Location:
         """Where to point for an error: of fields that contradict each other, one that is here."""
-        location = (*below, *detail["loc"])
+        location = detail["loc"]
         if detail["type"] != _INCONSISTENT:
             return location
         fields: list[str] = detail["ctx"]["fields"]
@@ -265,25 +273,13 @@ def _type_name(bare: Any) -> str:
 # --- writing ------------------------------------------------------------------------------------
 
 
-def dump(model: BaseModel, *, header: str = "") -> str:
+def dump(model: BaseModel) -> str:
     """The model as YAML with description and unit behind every key; loads back to an equal one."""
-    return _dump(_commented(model), header)
-
-
-def dump_sections(sections: dict[str, Any], *, header: str = "") -> str:
-    """A mapping of plain values and of models as YAML; models are commented."""
-    document = CommentedMap()
-    for key, value in sections.items():
-        document[key] = _commented(value) if isinstance(value, BaseModel) else value
-    return _dump(document, header)
-
-
-def _dump(document: CommentedMap, header: str) -> str:
     yaml = YAML(typ="rt")
     yaml.width = 4096  # long lines instead of folded comments
     stream = io.StringIO()
-    yaml.dump(document, stream)
-    return "".join(f"# {line}\n" for line in header.splitlines()) + stream.getvalue()
+    yaml.dump(_commented(model), stream)
+    return stream.getvalue()
 
 
 _COMMENT_COLUMN = 34
