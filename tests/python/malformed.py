@@ -568,7 +568,7 @@ MALFORMED_CONFIGS = [
     MalformedYaml("key twice", "base: full\nbase: paper\n", "duplicate key", line=2),
     MalformedYaml("tab", "noises:\n\tcable_std: 1\n", "not valid YAML", line=2),
     MalformedYaml("control character", "noises:\n  \x07\n", "not valid YAML", line=2),
-    MalformedYaml("nested too deeply", "[" * 400 + "]" * 400, "nested too deeply"),
+    MalformedYaml("nested too deeply", "{a: " * 1000 + "}" * 1000, "nested too deeply"),
     MalformedYaml(
         "section inside itself",
         "noises: &n\n  spin_std: *n\n",
