@@ -17,14 +17,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tensegrity.cli.console import out, progress_bars
+from tensegrity.simulation import Manoeuvre, SimulationOptions
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
     from tensegrity.evaluation import Metrics
 
-MANOEUVRES = ("forward", "backward", "left-turn", "right-turn")
-"""The simulated ones of Tong et al. 2024, Table II."""
 METHODS = ("paper", "full")
 
 QUICK_PATH_M = 3.0
@@ -49,7 +48,7 @@ def demo(
 
     started = time.monotonic()
     path_length = QUICK_PATH_M if quick else None
-    results = _in_parallel([Task(name, seed, path_length, directory) for name in MANOEUVRES])
+    results = _in_parallel([Task(name, seed, path_length, directory) for name in Manoeuvre])
     out.print(demo_table(results, TABLE_II), soft_wrap=False)
     out.print(
         "T: Tong et al. 2024, on recordings of their own simulation.\n"
@@ -66,7 +65,7 @@ RECORDINGS, RUNS, FIGURES = "recordings", "runs", "figures"
 class Task:
     """One manoeuvre of the demo; ``path_length`` [m] in place of the published one."""
 
-    manoeuvre: str
+    manoeuvre: Manoeuvre
     seed: int
     path_length: float | None
     directory: Path
@@ -75,14 +74,13 @@ class Task:
         """Simulate, estimate, evaluate, draw; returns the metrics by method."""
         from tensegrity import robots
         from tensegrity.cli.evaluate import METRICS
-        from tensegrity.cli.simulate import SIMULATION, describe, record
+        from tensegrity.cli.recording import SIMULATION, describe, record
         from tensegrity.config import FilterConfig
         from tensegrity.estimation import estimate
         from tensegrity.evaluation import compare, measure
         from tensegrity.plotting import save_figures
         from tensegrity.run import write_run
         from tensegrity.sequence import read
-        from tensegrity.simulation.options import SimulationOptions
 
         robot = robots.load("prism3")
         options = SimulationOptions(seed=self.seed, path_length=self.path_length)

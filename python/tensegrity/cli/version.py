@@ -11,8 +11,12 @@ from tensegrity.cli.console import out
 
 def version() -> None:
     """Print the version of this package and of Python."""
+    out.print(f"tensegrity {package_version()}, Python {platform.python_version()}")
+
+
+def package_version() -> str:
+    """The version of this package."""
     try:
-        number = installed_version("tensegrity-estimation")
+        return installed_version("tensegrity-estimation")
     except PackageNotFoundError:
-        number = "(not installed)"
-    out.print(f"tensegrity {number}, Python {platform.python_version()}")
+        return "not installed"  # used from a source tree
