@@ -7,6 +7,8 @@ face to the next but one, so a gait is two rows of offsets, one per kind of face
 
 from __future__ import annotations
 
+from enum import Enum, auto
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,8 +40,10 @@ REST_LENGTH_LIMITS = (0.55, 1.35)
 
 _FULL_STEER = np.radians(20)  # course error at which a straight run turns as fast as it can
 _CROSS_TRACK_GAIN = np.radians(20)  # course correction per metre off the line
-_STUCK_AFTER_S = 8.0
-_TIP_BACK_S = (2.0, 4.0)
+# Times are stated as what a cable can travel in them [m], so that they fit fast and slow robots.
+_STUCK_AFTER = 1.0
+_TIP_BACK = (0.26, 0.52)  # drawn at random
+_REST = 0.5  # more than the largest offset
 _TIP_BACK_AHEAD = (2, 4)  # faces ahead whose shape tips the robot back: from 2 up to, not with, 4
 
 
@@ -62,6 +66,12 @@ def _expand(kinds: tuple[tuple[float, ...], ...]) -> FloatArray:
     return table
 
 
+class _Phase(Enum):
+    ROLLING = auto()
+    TIPPING_BACK = auto()
+    RESTING = auto()
+
+
 class Gait:
     """Rest lengths of the side cables for a manoeuvre, from the pose of the endcaps.
 
@@ -71,7 +81,7 @@ class Gait:
 
     From rest the gaits set out from faces of the first kind only. On a face of the second kind, and
     when the robot stays on one face for too long, it first tips back over the edge it would have
-    come from, by taking the shape of a face further on for a random while.
+    come from, by taking the shape of a face further on, and then returns to its undeformed shape.
     """
 
     def __init__(
@@ -81,10 +91,12 @@ class Gait:
         nominal: FloatArray,
         ground_normal: FloatArray,
         gain: float,
+        cable_speed: float,
         rng: np.random.Generator,
     ) -> None:
         """``nominal`` (6,) are the rest lengths of the undeformed robot [m]; ``gain`` scales the
-        offsets; ``rng`` draws how long and how it tips back when stuck."""
+        offsets; ``cable_speed`` is that of the rest lengths [m/s]; ``rng`` draws how long and how
+        the robot tips back when stuck."""
         self._reversed = manoeuvre is Manoeuvre.BACKWARD
         self._clockwise = clockwise
         straight, left, right = _expand(_STRAIGHT), _expand(_LEFT), _expand(_RIGHT)
@@ -98,11 +110,14 @@ class Gait:
         self._nominal = nominal
         self._up = ground_normal
         self._gain = gain
+        self._cable_speed = cable_speed
         self._rng = rng
         self._line: tuple[FloatArray, float] | None = None
-        self._face = -1
-        self._on_face_since = 0.0
-        self._tip_back: tuple[float, int] | None = None  # until when, with the shape of which face
+        self._face: int | None = None
+        self._phase = _Phase.ROLLING
+        self._phase_end = 0.0
+        self._stuck_at = 0.0
+        self._tip_back_shape = 0
 
     def rest_lengths(self, time: float, endcaps: FloatArray) -> FloatArray:
         """Wanted rest lengths (6,) [m] at ``time`` [s] with ``endcaps`` (6, 3) in the world [m]."""
@@ -110,32 +125,39 @@ class Gait:
             endcaps = endcaps[::-1]
         heights = endcaps @ self._up
         face = int(heights[self._faces].mean(axis=1).argmin())
-        if face != self._face:
-            at_rest = self._face == -1
-            self._face, self._on_face_since, self._tip_back = face, time, None
-            if at_rest and face % 2 == 1:
-                self._start_tipping_back(time)
+        self._advance(face, time)
         table = self._steered(endcaps) if self._turn is None else self._turn
-        offsets = self._gain * self._row(table, time)
+        offsets = self._gain * self._row(table, face)
         if self._reversed:
             offsets = offsets[self._reverse_cables]
         return np.clip(self._nominal + offsets, *REST_LENGTH_LIMITS)
 
-    def _row(self, table: FloatArray, time: float) -> FloatArray:
-        """Offsets for the current face, or those that tip the robot back."""
-        if self._tip_back is None and time - self._on_face_since > _STUCK_AFTER_S:
-            self._start_tipping_back(time)
-        if self._tip_back is None:
-            return table[self._face]
-        until, face = self._tip_back
-        if time > until:
-            self._tip_back, self._on_face_since = None, time
-        return table[face]
+    def _advance(self, face: int, time: float) -> None:
+        """Note the face the robot lies on; begin and end attempts to get unstuck."""
+        changed = face != self._face
+        sets_out_badly = self._face is None and face % 2 == 1
+        self._face = face
+        if self._phase is _Phase.ROLLING:
+            if changed:
+                self._stuck_at = time + _STUCK_AFTER / self._cable_speed
+            if sets_out_badly or time > self._stuck_at:
+                self._phase = _Phase.TIPPING_BACK
+                self._phase_end = time + self._rng.uniform(*_TIP_BACK) / self._cable_speed
+                ahead = int(self._rng.integers(*_TIP_BACK_AHEAD))
+                self._tip_back_shape = (face + ahead) % len(FACES)
+        elif self._phase is _Phase.TIPPING_BACK:
+            if changed or time > self._phase_end:
+                self._phase = _Phase.RESTING
+                self._phase_end = time + _REST / self._cable_speed
+        elif time > self._phase_end:
+            self._phase = _Phase.ROLLING
+            self._stuck_at = time + _STUCK_AFTER / self._cable_speed
 
-    def _start_tipping_back(self, time: float) -> None:
-        ahead = int(self._rng.integers(*_TIP_BACK_AHEAD))
-        until = time + self._rng.uniform(*_TIP_BACK_S)
-        self._tip_back = until, (self._face + ahead) % len(FACES)
+    def _row(self, table: FloatArray, face: int) -> FloatArray:
+        """Offsets (6,) for ``face`` in the current phase."""
+        if self._phase is _Phase.RESTING:
+            return np.zeros(len(SIDE_CABLES))
+        return table[face if self._phase is _Phase.ROLLING else self._tip_back_shape]
 
     def _steered(self, endcaps: FloatArray) -> FloatArray:
         """The straight gait with as much of a turn as leads back to the line of the start."""

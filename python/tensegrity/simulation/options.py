@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
-from tensegrity.errors import InputError
+from tensegrity.errors import InputError, did_you_mean
 from tensegrity.yaml_model import StrictModel, field, unit_of
 
 ImuSampling = Literal["interval_mean", "instantaneous"]
@@ -21,7 +21,7 @@ class SimulationOptions(StrictModel):
 
     seed: int = field("the same seed gives identical recordings", default=0, ge=0)
     randomize: bool = field(
-        "draw initial yaw, IMU mounting, friction (10 %), gait gain and speed (3 %) from the seed",
+        "draw initial yaw, IMU mounting, friction and speed (10 %), gait gain (5 %) from the seed",
         default=True,
     )
 
@@ -95,8 +95,8 @@ def _input_error(error: ValidationError) -> InputError:
     name = str(detail["loc"][0])
     info = SimulationOptions.model_fields.get(name)
     if info is None:
-        known = ", ".join(SimulationOptions.model_fields)
-        return InputError("unknown simulation option", field=name, hint=f"known: {known}")
+        hint = did_you_mean(name, SimulationOptions.model_fields)
+        return InputError("unknown simulation option", field=name, hint=hint)
     unit = unit_of(info)
     expected = detail["msg"][0].lower() + detail["msg"][1:] + (f" [{unit}]" if unit else "")
     return InputError(f"{expected}, got {detail['input']!r}", field=name, hint=info.description)

@@ -35,7 +35,7 @@ _LONGEST_SETTLING_S = 20.0
 _LONGEST_COMING_TO_REST_S = 5.0
 # The prism rolls at 1.5 to 2 times the speed of its cables; at a third of that it is called stuck.
 _SLOWEST_ROLLING = 0.5  # of the speed of the cables
-_TIME_TO_SET_OUT_S = 20.0
+_TRAVEL_TO_SET_OUT = 3.0  # of a cable [m]: time for two attempts
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def simulate(
     )
     rest_lengths = np.array([cable.rest_length for cable in robot.cables])
     clockwise = robot.chirality == "clockwise"
-    gait = Gait(manoeuvre, clockwise, rest_lengths[:6], up, draw.gain, motion_rng)
+    gait = Gait(manoeuvre, clockwise, rest_lengths[:6], up, draw.gain, draw.cable_speed, motion_rng)
     path_length = manoeuvre.path_length if options.path_length is None else options.path_length
 
     _settle(world)
@@ -111,7 +111,7 @@ def _variant(robot: Robot, options: SimulationOptions) -> Robot:
 
 def _draw(options: SimulationOptions, rng: np.random.Generator) -> _Draw:
     turns = rng.uniform(-np.pi, np.pi, 4)
-    friction, gain, speed = 1 + np.array([0.10, 0.03, 0.03]) * rng.uniform(-1, 1, 3)
+    friction, gain, speed = 1 + np.array([0.10, 0.05, 0.10]) * rng.uniform(-1, 1, 3)
     if not options.randomize:
         return _Draw(0.0, np.zeros(3), options.friction, 1.0, options.cable_speed)
     return _Draw(
@@ -167,7 +167,7 @@ def _roll(
     stride = cable_speed * STEP_S
     endcaps = world.endcaps()
     path, last_report, begin = 0.0, 0.0, log.steps
-    limit_s = _TIME_TO_SET_OUT_S + path_length / (_SLOWEST_ROLLING * cable_speed)
+    limit_s = (_TRAVEL_TO_SET_OUT + path_length / _SLOWEST_ROLLING) / cable_speed
     while path < path_length:
         elapsed = (log.steps - begin) * STEP_S
         if elapsed > limit_s:

@@ -100,7 +100,7 @@ class World:
         spec.option.timestep = STEP_S
         spec.option.gravity = GRAVITY
         spec.option.integrator = mj.mjtIntegrator.mjINT_IMPLICITFAST
-        contact = {
+        contact: dict[str, object] = {
             "friction": [friction, 0.005, 0.0001],
             "solref": [floor_time_constant, _DAMPING_RATIO],
             "solimp": list(_IMPEDANCE),
