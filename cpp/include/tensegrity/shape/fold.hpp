@@ -27,6 +27,30 @@ TangentMatrix<Scalar> bordered_jacobian(const Rods<Scalar>& rods) {
   return bordered;
 }
 
+// Cofactor matrix, d det(A) / dA. Exact for a singular matrix too, as long as its rank deficiency
+// is one: with complete pivoting only the last pivot p can then vanish, and
+//   adj([U1 u; 0 p]) = det(U1) [p U1^-1, -U1^-1 u; 0, 1].
+template <typename Scalar>
+TangentMatrix<Scalar> cofactors(const TangentMatrix<Scalar>& matrix) {
+  constexpr int n = kTangent - 1;
+  const Eigen::FullPivLU<TangentMatrix<Scalar>> lu(matrix);  // P A Q = L U
+  const TangentMatrix<Scalar>& factors = lu.matrixLU();
+  const Matrix<Scalar, n> u1 = factors.template topLeftCorner<n, n>();
+  const auto upper = u1.template triangularView<Eigen::Upper>();
+  TangentMatrix<Scalar> adjugate = TangentMatrix<Scalar>::Zero();  // of U, over det(U1)
+  adjugate.template topLeftCorner<n, n>().diagonal().setConstant(factors(n, n));
+  adjugate.template topRightCorner<n, 1>() = -factors.template topRightCorner<n, 1>();
+  upper.solveInPlace(adjugate.template topRows<n>());
+  adjugate(n, n) = 1;
+  // adj(A) = det(P) det(Q) Q adj(U) L^-1 P, and the cofactors are its transpose.
+  factors.template triangularView<Eigen::UnitLower>().template solveInPlace<Eigen::OnTheRight>(
+      adjugate);
+  const Scalar scale =
+      lu.permutationP().determinant() * lu.permutationQ().determinant() * u1.diagonal().prod();
+  adjugate = (lu.permutationQ() * adjugate * lu.permutationP()).eval();
+  return scale * adjugate.transpose();
+}
+
 }  // namespace detail
 
 // +-det[J; t], dimensionless: zero on the fold and positive on the branch of smaller twist, which a
@@ -40,19 +64,7 @@ Scalar fold(const Rods<Scalar>& rods, Scalar moment_sign) {
 // Gradient of `fold` with respect to the tangent [1/m], exact at the fold as well.
 template <typename Scalar>
 Tangent<Scalar> fold_gradient(const Rods<Scalar>& rods, Scalar moment_sign) {
-  const TangentMatrix<Scalar> bordered = detail::bordered_jacobian(rods);
-  // Cofactors C = det(U) det(V) U diag(prod_{j != i} s_j) V' need no inverse of a singular matrix.
-  const Eigen::JacobiSVD<TangentMatrix<Scalar>, Eigen::NoQRPreconditioner> svd(
-      bordered, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Tangent<Scalar>& s = svd.singularValues();
-  Tangent<Scalar> others;
-  for (int i = 0; i < kTangent; ++i) {
-    others[i] = 1;
-    for (int j = 0; j < kTangent; ++j) others[i] *= i == j ? Scalar(1) : s[j];
-  }
-  const Scalar handedness = svd.matrixU().determinant() * svd.matrixV().determinant();
-  const TangentMatrix<Scalar> cofactors =
-      handedness * svd.matrixU() * others.asDiagonal() * svd.matrixV().transpose();
+  const TangentMatrix<Scalar> cofactors = detail::cofactors(detail::bordered_jacobian(rods));
   // d det = sum_ij C_ij dA_ij. The last row adds nothing: its cofactors are parallel to t (both are
   // orthogonal to every row of J), and a unit vector changes across itself.
   Tangent<Scalar> gradient = Tangent<Scalar>::Zero();

@@ -30,7 +30,7 @@ template <typename Scalar>
 struct SolverOptions {
   int max_iterations = 50;  // per start
   // Length of the last tangent step [m].
-  Scalar tolerance = std::is_same_v<Scalar, float> ? Scalar(1e-5) : Scalar(1e-7);
+  Scalar tolerance = std::is_same_v<Scalar, float> ? Scalar(1e-5) : Scalar(1e-6);
 };
 
 // kOk when every length is finite and a prism could have it, else why not.
@@ -172,22 +172,30 @@ class Solver {
     TangentMatrix<Scalar> first_order;
     TangentMatrix<Scalar> second_order;
     Tangent<Scalar> gradient;
-    bool stale = true;
+    bool moved = true;
+    bool newton = false;  // Gauss-Newton until that makes little progress
+    bool has_second_order = false;
     while (now.iterations < options_.max_iterations) {
       ++now.iterations;
-      if (stale) {
+      if (moved) {
         const LengthJacobian<Scalar> jacobian = length_jacobian(now.rods);
         const Tangent<Scalar> t = spin_tangent(now.rods);
         gradient.noalias() = jacobian.transpose() * residual;
-        first_order.noalias() = jacobian.transpose() * jacobian;
+        // Coefficient by coefficient: faster than a blocked product at this size.
+        first_order = jacobian.transpose().lazyProduct(jacobian);
         first_order.noalias() += t * t.transpose();
-        second_order = weighted_length_hessian(now.rods, residual);
-        stale = false;
+        moved = false;
+        has_second_order = false;
       }
-      TangentMatrix<Scalar> hessian = first_order + second_order;
+      if (newton && !has_second_order) {
+        second_order = weighted_length_hessian(now.rods, residual);
+        has_second_order = true;
+      }
+      TangentMatrix<Scalar> hessian = first_order;
+      if (newton) hessian += second_order;
       hessian.diagonal().array() += damping;
       Eigen::LLT<TangentMatrix<Scalar>> factor(hessian);
-      if (factor.info() != Eigen::Success) {
+      if (factor.info() != Eigen::Success) {  // not a minimum of the second-order model
         damping = std::max(damping, initial_damping);
         hessian = first_order;
         hessian.diagonal().array() += damping;
@@ -204,13 +212,13 @@ class Solver {
       trial.retract(step);
       const Vector<Scalar, 9> trial_residual = cable_lengths(trial.endcaps()) - lengths;
       const Scalar trial_cost = trial_residual.squaredNorm();
-      const bool better = trial_cost < now.cost;
-      if (better) {
+      newton = trial_cost > Scalar(0.1) * now.cost;
+      if (trial_cost < now.cost) {
         now.rods = trial;
         now.cost = trial_cost;
         residual = trial_residual;
         damping = damping > initial_damping / 100 ? damping / 10 : Scalar(0);
-        stale = true;
+        moved = true;
       } else {
         damping = std::max(10 * damping, initial_damping);
       }

@@ -27,8 +27,6 @@ struct TrackerOptions {
   int max_dropped = 3;
   // After so many dropped samples in a row the tracker itself is wrong, and starts again.
   int max_rejections = 10;
-  // Relinearisations of one correction.
-  int iterations = 2;
   // Soft prior: where `fold` is below the threshold, it is measured to be there, with this standard
   // deviation. Zero switches it off.
   Scalar fold_threshold = Scalar(0.1);
@@ -54,7 +52,6 @@ class Tracker {
     solver_.reset();
     const Status solved = solver_.solve(lengths);
     if (!used(solved)) return solved;
-    Matrix<Scalar, 18> unused;
     TangentMatrix<Scalar> covariance;
     const Status spread = solver_.tangent_covariance(cable_std, covariance);
     if (!used(spread)) return spread;
@@ -77,7 +74,6 @@ class Tracker {
     covariance_.diagonal().array() += step * step;
     const Scalar largest = covariance_.diagonal().maxCoeff();
     if (largest > limit * limit) covariance_ *= limit * limit / largest;
-    publish();
   }
 
   // Nine lengths [m] with independent errors of standard deviation `cable_std` [m]. Cables that are
@@ -111,7 +107,9 @@ class Tracker {
   // Body frame, Procrustes gauge of the undeformed robot [m].
   const Endcaps<Scalar>& endcaps() const { return endcaps_; }
   // Of the stacked endcaps in that gauge, 18 x 18 [m^2].
-  const Matrix<Scalar, 18>& covariance() const { return endcap_covariance_; }
+  Matrix<Scalar, 18> covariance() const {
+    return endcap_covariance(rods_, covariance_, reference_);
+  }
   bool initialized() const { return initialized_; }
   // Side and distance of the fold, see fold.hpp.
   Scalar fold() const { return shape::fold(rods_, prism_.moment_sign()); }
@@ -157,32 +155,30 @@ class Tracker {
     return dropped <= options_.max_dropped;
   }
 
-  // Iterated update with all usable cables at once.
+  // One update with all usable cables at once. Linearised at the prediction on purpose:
+  // relinearised at its own result, next to the fold, the update was less accurate and more sure of
+  // itself.
   void update_lengths(const CableLengths<Scalar>& lengths, Scalar cable_std, const Mask& usable,
                       Rods<Scalar>& rods, TangentMatrix<Scalar>& covariance) const {
-    const Rods<Scalar> prior = rods;
-    const TangentMatrix<Scalar> prior_covariance = covariance;
-    Tangent<Scalar> delta = Tangent<Scalar>::Zero();
-    LengthJacobian<Scalar> jacobian;
-    Matrix<Scalar, kTangent, 9> gain;
-    for (int iteration = 0; iteration < options_.iterations; ++iteration) {
-      jacobian = length_jacobian(rods);
-      CableLengths<Scalar> innovation = lengths - cable_lengths(rods.endcaps());
-      for (int k = 0; k < 9; ++k) {
-        // A row of zeros is a measurement that says nothing: the size stays fixed.
-        if (usable[index(k)]) continue;
-        jacobian.row(k).setZero();
-        innovation[k] = 0;
-      }
-      const Matrix<Scalar, kTangent, 9> cross = prior_covariance * jacobian.transpose();
-      Matrix<Scalar, 9> spread = jacobian * cross;
-      spread.diagonal().array() += cable_std * cable_std;
-      gain = spread.llt().solve(cross.transpose()).transpose();
-      delta = gain * (innovation + jacobian * delta);
-      rods = prior;
-      rods.retract(delta);
+    LengthJacobian<Scalar> jacobian = length_jacobian(rods);
+    CableLengths<Scalar> innovation = lengths - cable_lengths(rods.endcaps());
+    for (int k = 0; k < 9; ++k) {
+      // A row of zeros is a measurement that says nothing: the size stays fixed.
+      if (usable[index(k)]) continue;
+      jacobian.row(k).setZero();
+      innovation[k] = 0;
     }
-    joseph<9>(gain, jacobian, cable_std * cable_std, covariance);
+    const Scalar variance = cable_std * cable_std;
+    const Matrix<Scalar, kTangent, 9> cross = covariance * jacobian.transpose();
+    Matrix<Scalar, 9> spread = jacobian * cross;
+    spread.diagonal().array() += variance;
+    const Matrix<Scalar, kTangent, 9> gain = spread.llt().solve(cross.transpose()).transpose();
+    rods.retract(gain * innovation);
+    // Joseph's form (I - K J) P (I - K J)' + K R K' stays positive semi-definite under rounding.
+    const TangentMatrix<Scalar> keep = TangentMatrix<Scalar>::Identity() - gain * jacobian;
+    const TangentMatrix<Scalar> updated =
+        keep * covariance * keep.transpose() + variance * gain * gain.transpose();
+    covariance = (updated + updated.transpose()) / 2;
   }
 
   // The soft one-sided prior. It moves the shape but does not claim to have measured it: what the
@@ -197,17 +193,6 @@ class Tracker {
     const Tangent<Scalar> cross = covariance * gradient;
     const Scalar variance = gradient.dot(cross) + options_.fold_std * options_.fold_std;
     rods.retract(cross * (missing / variance));
-  }
-
-  // (I - K H) P (I - K H)' + K R K', which keeps P positive semi-definite under rounding.
-  template <int Rows>
-  static void joseph(const Matrix<Scalar, kTangent, Rows>& gain,
-                     const Matrix<Scalar, Rows, kTangent>& jacobian, Scalar variance,
-                     TangentMatrix<Scalar>& covariance) {
-    const TangentMatrix<Scalar> keep = TangentMatrix<Scalar>::Identity() - gain * jacobian;
-    const TangentMatrix<Scalar> updated =
-        keep * covariance * keep.transpose() + variance * gain * gain.transpose();
-    covariance = (updated + updated.transpose()) / 2;
   }
 
   bool credible(const Rods<Scalar>& rods, const TangentMatrix<Scalar>& covariance) const {
@@ -229,7 +214,6 @@ class Tracker {
   void publish() {
     move_to_procrustes_gauge(rods_, reference_, covariance_);
     endcaps_ = rods_.endcaps();
-    endcap_covariance_ = endcap_covariance(rods_, covariance_, reference_);
   }
 
   Prism<Scalar> prism_;
@@ -239,7 +223,6 @@ class Tracker {
   Rods<Scalar> rods_;
   TangentMatrix<Scalar> covariance_ = TangentMatrix<Scalar>::Zero();
   Endcaps<Scalar> endcaps_;
-  Matrix<Scalar, 18> endcap_covariance_ = Matrix<Scalar, 18>::Zero();
   int rejections_ = 0;
   bool initialized_ = false;
 };
