@@ -6,7 +6,6 @@ import typing
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel
-from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from tensegrity.errors import did_you_mean, quoted
