@@ -55,7 +55,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Drawing takes seconds; tests about something else go without."""
-    monkeypatch.setattr("tensegrity.plotting.save_figures", lambda *_: [])
+    monkeypatch.setattr("tensegrity.cli.evaluate.save_figures", lambda *_: [])
 
 
 @pytest.fixture
@@ -94,8 +94,8 @@ def test_help_has_an_example_that_is_the_command(command: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["demonstrate"], "No such command 'demonstrate'"),
-        (["demoo"], "Did you mean 'demo'"),
+        (["demonstrate"], "no command 'demonstrate'"),
+        (["demoo"], "did you mean 'demo'?"),
         (["--fast"], "No such option: --fast (see 'tensegrity --help')"),
         (["simulate", "forward"], "Missing option '--out' (see 'tensegrity simulate --help')"),
         (["simulate", "forward", "--out", "x", "--friction", "wet"], "'--friction'"),
@@ -365,12 +365,57 @@ def test_compare_side_by_side_with_figures(run: Path, recording: Path, tmp_path:
     assert (tmp_path / "figures" / "forward" / "top_view.png").is_file()
 
 
+def test_compare_does_not_draw_different_recordings_together(
+    run: Path, recording: Path, tmp_path: Path
+) -> None:
+    namesake = tmp_path / "elsewhere" / "forward"
+    write(read(recording), namesake)
+    sequence = read(namesake)
+    other = tmp_path / "other"
+    write_run(
+        true_trajectory(sequence),
+        other,
+        sequence=namesake,
+        robot=sequence.robot,
+        config=FilterConfig.load("full"),
+    )
+    for path in (run, other):
+        evaluation.evaluate(read_run(path).trajectory, sequence).save(path / "metrics.json")
+    assert tensegrity("compare", run, other).exit_code == 0
+    result = tensegrity("compare", run, other, "--figures", tmp_path / "figures")
+    assert result.exit_code == 2
+    assert "different recordings" in result.stderr
+    assert not (tmp_path / "figures").exists()
+
+
 def test_compare_needs_metrics(run: Path) -> None:
     assert_bad_input(tensegrity("compare", run), "metrics.json", "tensegrity evaluate")
 
 
 def test_compare_a_run_with_itself(run: Path) -> None:
     assert_bad_input(tensegrity("compare", run, run), "named twice")
+
+
+# --- extras -------------------------------------------------------------------------------------
+
+
+def test_without_mujoco_simulate_names_the_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    result = tensegrity("simulate", "forward", "--out", tmp_path / "r")
+    assert_bad_input(result, "needs the 'sim' extra", "pip install 'tensegrity-estimation[sim]'")
+    assert not (tmp_path / "r").exists()
+
+
+@pytest.mark.parametrize("module", ["evo.core.metrics", "matplotlib"])
+def test_without_evo_or_matplotlib_evaluate_names_the_extra(
+    module: str, run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    result = tensegrity("evaluate", run)
+    assert result.exit_code == 2
+    assert "needs the 'viz' extra" in result.stderr
 
 
 # --- failures -----------------------------------------------------------------------------------

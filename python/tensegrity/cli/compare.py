@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from tensegrity import evaluation
 from tensegrity.cli.console import out
 from tensegrity.cli.evaluate import METRICS, read_truth
+from tensegrity.cli.tables import metrics_table
 from tensegrity.errors import InputError
-
-if TYPE_CHECKING:
-    from tensegrity.evaluation import Metrics
+from tensegrity.evaluation import Metrics, published_result
+from tensegrity.plotting import save_figures
+from tensegrity.run import read_run
 
 
 def compare(
@@ -23,9 +25,6 @@ def compare(
     ] = None,
 ) -> None:
     """Print the metrics of runs side by side, one table per recording."""
-    from tensegrity.cli.tables import metrics_table
-    from tensegrity.evaluation import Metrics, published_result
-
     labels = _labels(runs)
     by_recording: dict[str, dict[str, Metrics]] = {}
     for path, label in labels.items():
@@ -51,15 +50,16 @@ def _labels(runs: list[Path]) -> dict[Path, str]:
     }
 
 
-def _draw(runs: dict[str, Path], metrics: dict[str, Metrics], directory: Path) -> None:
-    from tensegrity.evaluation import compare as compare_with_truth
-    from tensegrity.plotting import save_figures
-    from tensegrity.run import read_run
-
-    comparisons = {}
-    for label, path in runs.items():
-        run = read_run(path)
-        comparisons[label] = compare_with_truth(
-            run.trajectory, read_truth(run), metrics[label].alignment
+def _draw(paths: dict[str, Path], metrics: dict[str, Metrics], directory: Path) -> None:
+    runs = {label: read_run(path) for label, path in paths.items()}
+    recordings = {run.info.sequence for run in runs.values()}
+    if len(recordings) > 1:
+        raise InputError(
+            f"runs of different recordings cannot be drawn together: {', '.join(sorted(recordings))}",
+            hint="compare them without --figures, or recording by recording",
         )
+    comparisons = {
+        label: evaluation.compare(run.trajectory, read_truth(run), metrics[label].alignment)
+        for label, run in runs.items()
+    }
     save_figures(comparisons, directory)

@@ -7,14 +7,13 @@ from typing import Annotated
 import typer
 
 from tensegrity.cli.console import out
+from tensegrity.config import FilterConfig
 
 
 def config(
     source: Annotated[
-        str, typer.Argument(metavar="[NAME|FILE]", help="Packaged profile or your YAML file.")
+        str, typer.Argument(metavar="NAME|FILE", help="Packaged profile or your YAML file.")
     ] = "full",
 ) -> None:
     """Print the effective filter configuration, every key with its meaning and unit."""
-    from tensegrity.config import FilterConfig
-
     out.print(FilterConfig.load(source).to_yaml(), end="", markup=False)

@@ -12,20 +12,25 @@ from concurrent.futures import wait as wait_for
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, Queue
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from rich.progress import Progress
 
+from tensegrity import estimation, robots
 from tensegrity.cli.console import out, progress_bars
+from tensegrity.cli.evaluate import METRICS
+from tensegrity.cli.recording import SIMULATION, describe, record
+from tensegrity.cli.tables import demo_table
+from tensegrity.config import FilterConfig
+from tensegrity.evaluation import TABLE_II, Metrics, compare, measure
+from tensegrity.plotting import save_figures
+from tensegrity.run import write_run
+from tensegrity.sequence import read
 from tensegrity.simulation import Manoeuvre, SimulationOptions
 
-if TYPE_CHECKING:
-    from rich.progress import Progress
-
-    from tensegrity.evaluation import Metrics
-
 METHODS = ("paper", "full")
-
+RECORDINGS, RUNS, FIGURES = "recordings", "runs", "figures"
 QUICK_PATH_M = 3.0
 
 
@@ -43,9 +48,6 @@ def demo(
 
     Recordings that are already there with the same options are used again.
     """
-    from tensegrity.cli.tables import demo_table
-    from tensegrity.evaluation import TABLE_II
-
     started = time.monotonic()
     path_length = QUICK_PATH_M if quick else None
     results = _in_parallel([Task(name, seed, path_length, directory) for name in Manoeuvre])
@@ -56,9 +58,6 @@ def demo(
         f"figures: {directory / FIGURES}\ndone in {time.monotonic() - started:.0f} s",
         markup=False,
     )
-
-
-RECORDINGS, RUNS, FIGURES = "recordings", "runs", "figures"
 
 
 @dataclass(frozen=True)
@@ -72,17 +71,7 @@ class Task:
 
     def run(self, progress: Callable[[float], None]) -> dict[str, Metrics]:
         """Simulate, estimate, evaluate, draw; returns the metrics by method."""
-        from tensegrity import robots
-        from tensegrity.cli.evaluate import METRICS
-        from tensegrity.cli.recording import SIMULATION, describe, record
-        from tensegrity.config import FilterConfig
-        from tensegrity.estimation import estimate
-        from tensegrity.evaluation import compare, measure
-        from tensegrity.plotting import save_figures
-        from tensegrity.run import write_run
-        from tensegrity.sequence import read
-
-        robot = robots.load("prism3")
+        robot = robots.load()
         options = SimulationOptions(seed=self.seed, path_length=self.path_length)
         recording = self.directory / RECORDINGS / self.manoeuvre
         made = recording / SIMULATION
@@ -95,7 +84,7 @@ class Task:
         metrics, comparisons = {}, {}
         for method in METHODS:
             config = FilterConfig.load(method)
-            trajectory = estimate(sequence, config=config)
+            trajectory = estimation.estimate(sequence, config=config)
             run = self.directory / RUNS / f"{self.manoeuvre}-{method}"
             write_run(
                 trajectory,

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from tensegrity import estimation, robots
 from tensegrity.cli.console import err, out, progress_bar
 from tensegrity.cli.evaluate import evaluate_run
 from tensegrity.cli.output import check_output
+from tensegrity.config import FilterConfig
 from tensegrity.errors import InputError, MissingExtraError
-
-if TYPE_CHECKING:
-    from tensegrity.config import FilterConfig
+from tensegrity.evaluation import Alignment
+from tensegrity.run import TRAJECTORY, write_run
+from tensegrity.sequence import read
 
 
 class Method(StrEnum):
@@ -51,20 +53,13 @@ def estimate(
     ] = False,
 ) -> None:
     """Estimate shape and pose from a recording; where it holds the truth, evaluate as well."""
-    from tensegrity.estimation import estimate as estimate_trajectory
-
-    from tensegrity import robots
-    from tensegrity.evaluation import Alignment
-    from tensegrity.run import TRAJECTORY, write_run
-    from tensegrity.sequence import read
-
     filter_config = choose_config(config, method)
     recording = read(sequence, robot=None if robot is None else robots.load(robot))
     directory = output or Path("runs") / f"{recording.name}-{filter_config.settings.method}"
     check_output(directory, marker=TRAJECTORY, overwrite=overwrite)
 
     with progress_bar(f"estimating {recording.name}") as progress:
-        trajectory = estimate_trajectory(recording, config=filter_config, progress=progress)
+        trajectory = estimation.estimate(recording, config=filter_config, progress=progress)
     write_run(
         trajectory,
         directory,
@@ -84,8 +79,6 @@ def estimate(
 
 def choose_config(config: str | None, method: Method | None) -> FilterConfig:
     """The configuration that ``--config`` and ``--method`` ask for together."""
-    from tensegrity.config import FilterConfig
-
     if config is None:
         return FilterConfig.load(method or Method.FULL)
     chosen = FilterConfig.load(config)

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from tensegrity.cli.console import out
+from tensegrity.cli.tables import metrics_table
 from tensegrity.errors import InputError
-
-if TYPE_CHECKING:
-    from tensegrity.evaluation import Alignment, Metrics
-    from tensegrity.run import Run
-    from tensegrity.sequence import Sequence
-    from tensegrity.trajectory import Trajectory
+from tensegrity.evaluation import Alignment, compare, measure, published_result
+from tensegrity.plotting import save_figures
+from tensegrity.run import Run, read_run
+from tensegrity.sequence import Sequence, read
+from tensegrity.trajectory import Trajectory
 
 METRICS = "metrics.json"
 FIGURES = "figures"
@@ -35,9 +35,6 @@ def evaluate(
     ] = False,
 ) -> None:
     """Compare a run with the truth: prints a table, writes metrics.json and figures into RUN."""
-    from tensegrity.evaluation import Alignment
-    from tensegrity.run import read_run
-
     opened = read_run(run)
     evaluate_run(
         opened.trajectory,
@@ -49,8 +46,6 @@ def evaluate(
 
 def read_truth(run: Run, path: Path | None = None) -> Sequence:
     """The recording at ``path``, by default the one that the run was made from."""
-    from tensegrity.sequence import read
-
     if path is not None:
         return read(path)
     recorded = Path(run.info.sequence)
@@ -65,12 +60,8 @@ def read_truth(run: Run, path: Path | None = None) -> Sequence:
 
 def evaluate_run(
     trajectory: Trajectory, sequence: Sequence, directory: Path, alignment: Alignment
-) -> Metrics:
+) -> None:
     """Print the metrics of a run and write them and its figures into its directory."""
-    from tensegrity.cli.tables import metrics_table
-    from tensegrity.evaluation import compare, measure, published_result
-    from tensegrity.plotting import save_figures
-
     comparison = compare(trajectory, sequence, alignment)
     metrics = measure(comparison, trajectory.runtime_s)
     label = comparison.method or "estimate"
@@ -81,4 +72,3 @@ def evaluate_run(
     metrics.save(directory / METRICS)
     save_figures({label: comparison}, directory / FIGURES)
     out.print(f"metrics: {directory / METRICS}\nfigures: {directory / FIGURES}", markup=False)
-    return metrics
