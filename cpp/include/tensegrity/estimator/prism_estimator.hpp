@@ -53,7 +53,14 @@ class PrismEstimator {
         start_({config.init_bias_size, config.static_gyro_limit, config.static_accel_limit,
                 kPriorSigmas * config.gyroscope_bias_std,
                 kPriorSigmas * config.accelerometer_bias_std, config.gravity, config.gyroscope_bias,
-                config.accelerometer_bias}) {}
+                config.accelerometer_bias}) {
+    for (int contacts = 1; contacts <= MaxContacts; ++contacts) {
+      gates_[std::size_t(contacts)] =
+          config.chi_square_gate > 0
+              ? Scalar(chi_square_quantile(double(config.chi_square_gate), 3 * contacts))
+              : Scalar(0);
+    }
+  }
 
   // Angular velocity [rad/s] and specific force [m/s^2] in the IMU frame.
   Status imu(Nanoseconds t, const V3& gyro, const V3& accel) {
@@ -352,13 +359,14 @@ class PrismEstimator {
 
   Status correct(Nanoseconds t, const CableLengths<Scalar>& lengths) {
     const Endcaps<Scalar> before = endcaps_;
-    const Status shape = update_shape(lengths, std::max(seconds(shape_time_, t), Scalar(0)));
+    const Scalar dt = std::max(seconds(shape_time_, t), Scalar(0));
+    const Status shape = update_shape(lengths, dt);
     shape_time_ = t;
     if (shape != Status::kOk) {
       ++health_.shape_failures;
       return shape;
     }
-    if (!contacts_seen_) detect_contacts(t);
+    if (!contacts_seen_) detect_contacts(dt);
     roll_with_shape(before);
     const Status status = correct_contacts();
     update_contacts();
@@ -430,9 +438,7 @@ class PrismEstimator {
   Status correct_contacts() {
     if (belief_.anchor_count == 0) return Status::kOk;
     const auto innovation = inekf::contact_innovation(belief_, kinematics());
-    const Scalar gate = config_.chi_square_gate > 0
-                            ? chi_square_quantile(config_.chi_square_gate, 3 * belief_.anchor_count)
-                            : Scalar(0);
+    const Scalar gate = gates_[std::size_t(belief_.anchor_count)];
     const inekf::Correction correction = inekf::correct(belief_, innovation, gate);
     if (correction.status == Status::kRejected) {
       // The feet are not where they stood. They stand anew where the kinematics puts them.
@@ -444,9 +450,9 @@ class PrismEstimator {
 
   // ---- contacts
 
-  void detect_contacts(Nanoseconds) {
+  void detect_contacts(Scalar dt) {
     const Endcaps<Scalar> world = belief_.rotation * spun(endcaps_, belief_.extra[0]);
-    flags_ = detector_.update(world);
+    flags_ = detector_.update(world, dt);
     release_anchors();
   }
 
@@ -526,6 +532,7 @@ class PrismEstimator {
   Endcaps<Scalar> endcaps_ = Endcaps<Scalar>::Zero();  // Procrustes gauge, phi = 0 [m]
   CableLengths<Scalar> mean_lengths_ = CableLengths<Scalar>::Zero();
   inekf::ImuSample<Scalar> last_sample_{V3::Zero(), V3::Zero()};
+  std::array<Scalar, MaxContacts + 1> gates_{};  // by number of contacts; 0: no gate
   PrismHealth health_;
   Flags flags_{};
   Nanoseconds time_ = 0, last_cables_ = 0, last_contacts_ = 0, shape_time_ = 0;

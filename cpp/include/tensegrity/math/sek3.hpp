@@ -69,9 +69,7 @@ class SEk3 {
   const Columns& columns() const { return columns_; }
 
  private:
-  static Columns columns_of(const Tangent& x) {
-    return Eigen::Map<const Columns>(x.data() + 3);
-  }
+  static Columns columns_of(const Tangent& x) { return Eigen::Map<const Columns>(x.data() + 3); }
 
   // J_l of SE_k(3) is block lower triangular: J on the diagonal and Q(x_k, phi) in the first block
   // column; the inverse has J^-1 and -J^-1 Q J^-1 there.

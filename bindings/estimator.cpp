@@ -1,0 +1,292 @@
+// The streaming estimator, and the replay of whole recordings at C++ speed.
+#include "tensegrity/estimator/prism_estimator.hpp"
+
+#include <pybind11/functional.h>
+
+#include <chrono>
+
+#include "bindings.hpp"
+
+namespace tensegrity::bindings {
+
+namespace {
+
+using Estimator = PrismEstimator<double>;
+using State = PrismState<double>;
+using Config = PrismConfig<double>;
+using V3 = Vector3<double>;
+
+using Stamps = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Bools = py::array_t<bool, py::array::c_style | py::array::forcecast>;
+
+void check_rows(const py::array& a, const char* name, py::ssize_t rows, py::ssize_t cols) {
+  const bool good = cols == 0 ? a.ndim() == 1 && a.shape(0) == rows
+                              : a.ndim() == 2 && a.shape(0) == rows && a.shape(1) == cols;
+  if (!good) {
+    throw py::value_error(std::string(name) + ": expected shape (" + std::to_string(rows) +
+                          (cols == 0 ? ",)" : ", " + std::to_string(cols) + ")"));
+  }
+}
+
+Eigen::Vector4d quaternion(const Matrix3<double>& rotation) {
+  Eigen::Quaterniond q(rotation);
+  if (q.w() < 0) q.coeffs() = -q.coeffs();
+  return q.normalized().coeffs();  // x y z w
+}
+
+// One row per IMU sample after the start, as NumPy arrays.
+class Recorder {
+ public:
+  explicit Recorder(std::size_t capacity) { states_.reserve(capacity); }
+  void add(const State& s) { states_.push_back(s); }
+
+  py::dict arrays() const {
+    py::dict out;
+    const auto column = [&](const char* name, std::vector<py::ssize_t> tail, auto&& fill) {
+      std::vector<py::ssize_t> shape{py::ssize_t(states_.size())};
+      py::ssize_t width = 1;
+      for (const py::ssize_t n : tail) {
+        shape.push_back(n);
+        width *= n;
+      }
+      py::array_t<double> a(shape);
+      double* data = a.mutable_data();
+      for (std::size_t k = 0; k < states_.size(); ++k) fill(states_[k], data + py::ssize_t(k) * width);
+      out[name] = a;
+    };
+    using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+    const auto vector = [](const V3& v, double* to) { Eigen::Map<V3>(to) = v; };
+    const auto matrix = [](const Matrix3<double>& m, double* to) {
+      Eigen::Map<RowMajor3>{to} = m;
+    };
+    py::array_t<std::int64_t> t(py::ssize_t(states_.size()));
+    for (std::size_t k = 0; k < states_.size(); ++k) t.mutable_data()[k] = states_[k].t;
+    out["t_ns"] = t;
+    column("position", {3}, [&](const State& s, double* to) { vector(s.position, to); });
+    column("quaternion", {4}, [](const State& s, double* to) {
+      Eigen::Map<Eigen::Vector4d>(to) = quaternion(s.rotation);
+    });
+    column("velocity", {3}, [&](const State& s, double* to) { vector(s.velocity, to); });
+    column("gyro_bias", {3}, [&](const State& s, double* to) { vector(s.gyro_bias, to); });
+    column("accel_bias", {3}, [&](const State& s, double* to) { vector(s.accel_bias, to); });
+    column("spin", {}, [](const State& s, double* to) { *to = s.spin; });
+    column("endcaps_body", {6, 3}, [](const State& s, double* to) {
+      Eigen::Map<Endcaps<double>>(to) = s.endcaps_body;
+    });
+    column("endcaps_world", {6, 3}, [](const State& s, double* to) {
+      Eigen::Map<Endcaps<double>>(to) = s.endcaps_world;
+    });
+    column("position_covariance", {3, 3},
+           [&](const State& s, double* to) { matrix(s.position_covariance, to); });
+    column("orientation_covariance", {3, 3},
+           [&](const State& s, double* to) { matrix(s.rotation_covariance, to); });
+    column("velocity_covariance", {3, 3},
+           [&](const State& s, double* to) { matrix(s.velocity_covariance, to); });
+    py::array_t<bool> contacts({py::ssize_t(states_.size()), py::ssize_t(6)});
+    for (std::size_t k = 0; k < states_.size(); ++k) {
+      for (std::size_t i = 0; i < 6; ++i) contacts.mutable_data()[6 * k + i] = states_[k].contacts[i];
+    }
+    out["contacts"] = contacts;
+    py::dict health;
+    const auto counter = [&](const char* name, std::uint32_t PrismHealth::* member) {
+      py::array_t<std::int64_t> a(py::ssize_t(states_.size()));
+      for (std::size_t k = 0; k < states_.size(); ++k) {
+        a.mutable_data()[k] = states_[k].health.*member;
+      }
+      health[name] = a;
+    };
+    counter("imu_dropped", &PrismHealth::imu_dropped);
+    counter("imu_gaps", &PrismHealth::imu_gaps);
+    counter("cables_dropped", &PrismHealth::cables_dropped);
+    counter("contacts_dropped", &PrismHealth::contacts_dropped);
+    counter("shape_failures", &PrismHealth::shape_failures);
+    counter("contacts_rejected", &PrismHealth::contacts_rejected);
+    out["health"] = health;
+    return out;
+  }
+
+ private:
+  std::vector<State> states_;
+};
+
+// Feeds a whole recording: at equal stamps the IMU goes first, then contacts, then cables.
+py::tuple replay(Estimator& estimator, const Stamps& imu_t, const Doubles& gyro,
+                 const Doubles& accel, const Stamps& cables_t, const Doubles& lengths,
+                 const std::optional<Stamps>& contacts_t, const std::optional<Bools>& flags,
+                 const std::function<void(double)>& progress) {
+  check_rows(imu_t, "imu_t", imu_t.size(), 0);
+  check_rows(gyro, "gyro", imu_t.size(), 3);
+  check_rows(accel, "accel", imu_t.size(), 3);
+  check_rows(cables_t, "cables_t", cables_t.size(), 0);
+  check_rows(lengths, "lengths", cables_t.size(), 9);
+  if (contacts_t.has_value() != flags.has_value()) {
+    throw py::value_error("contacts_t and flags go together");
+  }
+  if (flags) check_rows(*flags, "flags", contacts_t->size(), 6);
+
+  const py::ssize_t imus = imu_t.size(), cables = cables_t.size();
+  const py::ssize_t contacts = contacts_t ? contacts_t->size() : 0;
+  Recorder recorder{std::size_t(imus)};
+  py::ssize_t c = 0, f = 0;
+  std::chrono::steady_clock::duration elapsed{0};
+  constexpr py::ssize_t kChunk = 2000;  // samples between two looks at signals and progress
+  for (py::ssize_t begin = 0; begin < imus; begin += kChunk) {
+    const py::ssize_t end = std::min(imus, begin + kChunk);
+    {
+      py::gil_scoped_release release;
+      const auto started = std::chrono::steady_clock::now();
+      for (py::ssize_t k = begin; k < end; ++k) {
+        const Nanoseconds t = imu_t.data()[k];
+        // What came before this sample waits in the estimator until the sample reaches it.
+        const auto feed_until = [&](auto&& due) {
+          while (f < contacts && due(contacts_t->data()[f])) {
+            std::array<bool, 6> now;
+            for (std::size_t i = 0; i < 6; ++i) now[i] = flags->data()[6 * f + py::ssize_t(i)];
+            estimator.contacts(contacts_t->data()[f], now);
+            ++f;
+          }
+          while (c < cables && due(cables_t.data()[c])) {
+            estimator.cables(cables_t.data()[c],
+                             Eigen::Map<const CableLengths<double>>(lengths.data() + 9 * c));
+            ++c;
+          }
+        };
+        feed_until([t](Nanoseconds stamp) { return stamp < t; });
+        estimator.imu(t, Eigen::Map<const V3>(gyro.data() + 3 * k),
+                      Eigen::Map<const V3>(accel.data() + 3 * k));
+        feed_until([t](Nanoseconds stamp) { return stamp == t; });
+        if (estimator.initialized()) recorder.add(estimator.state());
+      }
+      elapsed += std::chrono::steady_clock::now() - started;
+    }
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (progress) progress(double(end) / double(imus));
+  }
+  return py::make_tuple(recorder.arrays(), std::chrono::duration<double>(elapsed).count());
+}
+
+std::array<bool, 6> six_flags(const Bools& flags) {
+  check_rows(flags, "flags", 6, 0);
+  std::array<bool, 6> out;
+  std::copy(flags.data(), flags.data() + 6, out.begin());
+  return out;
+}
+
+}  // namespace
+
+void bind_estimator(py::module_& m) {
+  py::native_enum<ShapeMethod>(m, "ShapeMethod", "enum.Enum")
+      .value("LEAST_SQUARES", ShapeMethod::kLeastSquares)
+      .value("TRACKER", ShapeMethod::kTracker)
+      .finalize();
+  py::native_enum<SpinMethod>(m, "SpinMethod", "enum.Enum")
+      .value("FIXED", SpinMethod::kFixed)
+      .value("ESTIMATED", SpinMethod::kEstimated)
+      .finalize();
+  py::native_enum<ContactPoint>(m, "ContactPoint", "enum.Enum")
+      .value("CENTRE", ContactPoint::kCentre)
+      .value("ROLLING", ContactPoint::kRolling)
+      .finalize();
+  py::native_enum<ContactNoise>(m, "ContactNoise", "enum.Enum")
+      .value("CONSTANT", ContactNoise::kConstant)
+      .value("FROM_SHAPE", ContactNoise::kFromShape)
+      .finalize();
+  py::native_enum<ImuSampling>(m, "ImuSampling", "enum.Enum")
+      .value("INTERVAL_MEAN", ImuSampling::kIntervalMean)
+      .value("INSTANTANEOUS", ImuSampling::kInstantaneous)
+      .finalize();
+
+  py::class_<Config>(m, "PrismConfig", "Settings, priors and noises of the prism's estimator.")
+      .def(py::init<>())
+      .def_readwrite("shape", &Config::shape)
+      .def_readwrite("spin", &Config::spin)
+      .def_readwrite("contact_point", &Config::contact_point)
+      .def_readwrite("contact_noise", &Config::contact_noise)
+      .def_readwrite("imu_sampling", &Config::imu_sampling)
+      .def_readwrite("static_bias_initialization", &Config::static_bias_initialization)
+      .def_readwrite("init_bias_size", &Config::init_bias_size)
+      .def_readwrite("static_gyro_limit", &Config::static_gyro_limit)
+      .def_readwrite("static_accel_limit", &Config::static_accel_limit)
+      .def_readwrite("max_imu_gap", &Config::max_imu_gap)
+      .def_readwrite("max_latency", &Config::max_latency)
+      .def_readwrite("chi_square_gate", &Config::chi_square_gate)
+      .def_readwrite("gravity", &Config::gravity)
+      .def_readwrite("orientation_std", &Config::orientation_std)
+      .def_readwrite("velocity_std", &Config::velocity_std)
+      .def_readwrite("position_std", &Config::position_std)
+      .def_readwrite("gyroscope_bias", &Config::gyroscope_bias)
+      .def_readwrite("gyroscope_bias_std", &Config::gyroscope_bias_std)
+      .def_readwrite("accelerometer_bias", &Config::accelerometer_bias)
+      .def_readwrite("accelerometer_bias_std", &Config::accelerometer_bias_std)
+      .def_readwrite("spin_prior_std", &Config::spin_prior_std)
+      .def_readwrite("gyroscope_std", &Config::gyroscope_std)
+      .def_readwrite("accelerometer_std", &Config::accelerometer_std)
+      .def_readwrite("gyroscope_bias_walk", &Config::gyroscope_bias_walk)
+      .def_readwrite("accelerometer_bias_walk", &Config::accelerometer_bias_walk)
+      .def_readwrite("cable_std", &Config::cable_std)
+      .def_readwrite("contact_std", &Config::contact_std)
+      .def_readwrite("contact_position_std", &Config::contact_position_std)
+      .def_readwrite("spin_walk", &Config::spin_walk)
+      .def_readwrite("shape_std_rest", &Config::shape_std_rest)
+      .def_readwrite("shape_std_moving", &Config::shape_std_moving);
+
+  py::class_<PrismHealth>(m, "PrismHealth", "Counters since construction; see the C++ header.")
+      .def_readonly("imu_dropped", &PrismHealth::imu_dropped)
+      .def_readonly("imu_gaps", &PrismHealth::imu_gaps)
+      .def_readonly("cables_dropped", &PrismHealth::cables_dropped)
+      .def_readonly("contacts_dropped", &PrismHealth::contacts_dropped)
+      .def_readonly("shape_failures", &PrismHealth::shape_failures)
+      .def_readonly("contacts_rejected", &PrismHealth::contacts_rejected);
+
+  using Six = Eigen::Matrix<double, 6, 3>;
+  py::class_<State>(m, "PrismState", "One state of the prism, in SI units.")
+      .def_readonly("t", &State::t, "stamp [ns]")
+      .def_readonly("initialized", &State::initialized)
+      .def_readonly("rotation", &State::rotation, "(3, 3), body to world")
+      .def_property_readonly(
+          "quaternion", [](const State& s) { return quaternion(s.rotation); }, "(4,) x y z w")
+      .def_readonly("position", &State::position, "(3,), world [m]")
+      .def_readonly("velocity", &State::velocity, "(3,), world [m/s]")
+      .def_readonly("gyro_bias", &State::gyro_bias, "(3,), body [rad/s]")
+      .def_readonly("accel_bias", &State::accel_bias, "(3,), body [m/s^2]")
+      .def_readonly("spin", &State::spin, "phi [rad]")
+      .def_readonly("spin_variance", &State::spin_variance, "[rad^2]")
+      .def_property_readonly(
+          "endcaps_body", [](const State& s) -> Six { return s.endcaps_body.transpose(); },
+          "(6, 3) [m]")
+      .def_property_readonly(
+          "endcaps_world", [](const State& s) -> Six { return s.endcaps_world.transpose(); },
+          "(6, 3) [m]")
+      .def_readonly("endcap_covariance", &State::endcap_covariance, "(18, 18), body [m^2]")
+      .def_readonly("rotation_covariance", &State::rotation_covariance, "(3, 3), world [rad^2]")
+      .def_readonly("velocity_covariance", &State::velocity_covariance, "(3, 3) [m^2/s^2]")
+      .def_readonly("position_covariance", &State::position_covariance, "(3, 3) [m^2]")
+      .def_readonly("contacts", &State::contacts, "endcaps held as contacts")
+      .def_readonly("health", &State::health);
+
+  py::class_<Estimator>(m, "PrismEstimator",
+                        "Streaming estimator: IMU, cables and contacts in, state out.")
+      .def(py::init<const Prism<double>&, const Config&>(), py::arg("robot"), py::arg("config"))
+      .def("imu", &Estimator::imu, py::arg("t"), py::arg("gyro"), py::arg("accel"),
+           "One IMU sample: t [ns], angular velocity (3,) [rad/s], specific force (3,) [m/s^2].")
+      .def("cables", &Estimator::cables, py::arg("t"), py::arg("lengths"),
+           "Cable lengths: t [ns], (9,) [m] in the order of PRISM_CABLES.")
+      .def(
+          "contacts",
+          [](Estimator& e, Nanoseconds t, const Bools& flags) {
+            return e.contacts(t, six_flags(flags));
+          },
+          py::arg("t"), py::arg("flags"), "Contact flags: t [ns], (6,) true on the ground.")
+      .def_property_readonly("state", &Estimator::state)
+      .def_property_readonly("initialized", &Estimator::initialized)
+      .def_property_readonly(
+          "filter", [](const Estimator& e) { return e.belief(); },
+          "A copy of the invariant filter's mean and covariance.")
+      .def("replay", &replay, py::arg("imu_t"), py::arg("gyro"), py::arg("accel"),
+           py::arg("cables_t"), py::arg("lengths"), py::arg("contacts_t") = py::none(),
+           py::arg("flags") = py::none(), py::arg("progress") = py::none(),
+           "Feeds a whole recording and returns (arrays by name, seconds in the estimator).");
+}
+
+}  // namespace tensegrity::bindings
