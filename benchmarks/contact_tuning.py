@@ -23,8 +23,7 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 import tensegrity.sequence
-from tensegrity import simulation
-from tensegrity._core import ContactDetector, ContactDetectorParameters, Prism
+from tensegrity import _core, simulation
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -93,25 +92,25 @@ def perturbed(truth: Recording, random: np.random.Generator, scale: float = 1.0)
 SCALE = np.array([1.0, 1.0, 1.0, 100.0, 10.0, 1.0, 1.0, 1.0])
 
 
-def parameters(x: FloatArray) -> ContactDetectorParameters:
+def parameters(x: FloatArray) -> _core.ContactDetectorParameters:
     """From the vector that the optimiser sees; rates and times are logarithms there."""
     x = x * SCALE
-    p = ContactDetectorParameters()
+    p = _core.ContactDetectorParameters()
     p.intercept = list(x[:3])
     p.height_weight, p.share_weight = x[3:5]
     p.touch_down_rate, p.lift_off_rate, p.evidence_time = np.exp(x[5:])
     return p
 
 
-def vector(p: ContactDetectorParameters) -> FloatArray:
+def vector(p: _core.ContactDetectorParameters) -> FloatArray:
     """Inverse of :func:`parameters`."""
     logs = np.log([p.touch_down_rate, p.lift_off_rate, p.evidence_time])
     return np.concatenate([p.intercept, [p.height_weight, p.share_weight], logs]) / SCALE
 
 
-def probabilities(p: ContactDetectorParameters, r: Recording) -> FloatArray:
+def probabilities(p: _core.ContactDetectorParameters, r: Recording) -> FloatArray:
     """(N, 6) from a detector that starts afresh."""
-    return ContactDetector(Prism(), p).probabilities(r.endcaps, r.dt)
+    return _core.ContactDetector(_core.Prism(), p).probabilities(r.endcaps, r.dt)
 
 
 def negative_log_likelihood(x: FloatArray, recordings: Sequence[Recording]) -> float:
@@ -126,9 +125,9 @@ def negative_log_likelihood(x: FloatArray, recordings: Sequence[Recording]) -> f
 
 def fit(
     recordings: Sequence[Recording], fixed: Mapping[str, float] | None = None
-) -> ContactDetectorParameters:
+) -> _core.ContactDetectorParameters:
     """Parameters of the greatest likelihood, some of them held at ``fixed`` values."""
-    p = ContactDetectorParameters()
+    p = _core.ContactDetectorParameters()
     defaults = vector(p)
     for name, value in (fixed or {}).items():
         setattr(p, name, value)
@@ -146,7 +145,7 @@ def fit(
     return parameters(complete(result.x))
 
 
-def precision_recall(p: ContactDetectorParameters, recordings: Iterable[Recording]) -> str:
+def precision_recall(p: _core.ContactDetectorParameters, recordings: Iterable[Recording]) -> str:
     """``precision / recall`` over all endcaps of all recordings."""
     true_positives = positives = loaded = 0
     for r in recordings:
@@ -166,7 +165,7 @@ def simulated(seeds: Iterable[int]) -> list[Recording]:
     ]
 
 
-def print_parameters(p: ContactDetectorParameters) -> None:
+def print_parameters(p: _core.ContactDetectorParameters) -> None:
     print("intercept        ", ", ".join(f"{value:.2f}" for value in p.intercept))
     for name in ("height_weight", "share_weight"):
         print(f"{name:<17} {getattr(p, name):.1f}")
@@ -179,7 +178,7 @@ def main() -> None:
     cli.add_argument("--evaluate", action="store_true", help="measure the defaults, fit nothing")
     arguments = cli.parse_args()
 
-    detectors = {"defaults": ContactDetectorParameters()}
+    detectors = {"defaults": _core.ContactDetectorParameters()}
     if not arguments.evaluate:
         random = np.random.default_rng(1)
         recordings = [perturbed(r, random) for r in simulated(FIT_SEEDS)]
