@@ -55,7 +55,7 @@ def _draw(paths: dict[str, Path], metrics: dict[str, Metrics], directory: Path) 
     recordings = {run.info.sequence for run in runs.values()}
     if len(recordings) > 1:
         raise InputError(
-            f"runs of different recordings cannot be drawn together: {', '.join(sorted(recordings))}",
+            f"cannot draw runs of different recordings together: {', '.join(sorted(recordings))}",
             hint="compare them without --figures, or recording by recording",
         )
     comparisons = {

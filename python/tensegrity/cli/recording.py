@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from tensegrity.cli.version import package_version
+from tensegrity import __version__
 from tensegrity.robots import Robot
 from tensegrity.sequence import write
 from tensegrity.simulation import Manoeuvre, SimulationOptions, simulate
@@ -26,9 +26,7 @@ class SimulationInfo(StrictModel):
 def describe(manoeuvre: Manoeuvre, options: SimulationOptions, robot: Robot) -> str:
     """:class:`SimulationInfo` as YAML; the same text means the same recording."""
     return dump(
-        SimulationInfo(
-            version=package_version(), manoeuvre=manoeuvre.value, options=options, robot=robot
-        )
+        SimulationInfo(version=__version__, manoeuvre=manoeuvre.value, options=options, robot=robot)
     )
 
 
