@@ -37,7 +37,7 @@ ROWS = (
     Row("rpe_rot_rmse_deg_per_m", "RPE rotation, RMSE", "deg/m", ".2f"),
     Row("ate_rmse_m", "ATE, RMSE", "m", ".3f"),
     Row("z_drift_m", "final vertical error", "m", "+.3f"),
-    Row("endcap_rmse_m", "endcaps in body frame, RMSE", "m", ".4f"),
+    Row("endcap_rmse_m", "endcaps (body), RMSE", "m", ".4f"),
     Row("cable_rmse_m", "cable lengths, RMSE", "m", ".4f"),
     Row("nees_position_median", "NEES of position, median", "", ".2f"),
     Row("initial_tilt_deg", "tilt at the start", "deg", ".3f"),
