@@ -106,8 +106,10 @@ class Solver {
   //
   // Along the mechanism the linear formula sigma^2 / s^2 has no limit as s goes to zero on the
   // fold, where the error in truth grows with sqrt(sigma). It is replaced by sigma^2 / (s^2 +
-  // sqrt(pi/2) |kappa| sigma): with kappa x^2 / 2 = n, n normal, the variance of x is 2 E|n| /
-  // |kappa| sigma = sigma / (sqrt(pi/2) |kappa|) times one, which is the limit.
+  // sqrt(pi/2) |kappa| sigma). On the fold the shape follows kappa x^2 / 2 = n, with n the normal
+  // error of the self-stress-weighted lengths; for half of all n there is no solution and the fit
+  // stays at x = 0, hence E x^2 = 2 E max(n, 0) / |kappa| = sigma / (sqrt(pi/2) |kappa|), which is
+  // the limit of the formula.
   Status covariance(Scalar cable_std, Matrix<Scalar, 18>& out) const {
     TangentMatrix<Scalar> tangent;
     const Status status = tangent_covariance(cable_std, tangent);
