@@ -45,6 +45,8 @@ _STUCK_AFTER = 1.0
 _TIP_BACK = (0.26, 0.52)  # drawn at random
 _REST = 0.5  # more than the largest offset
 _TIP_BACK_AHEAD = (2, 4)  # faces ahead whose shape tips the robot back: from 2 up to, not with, 4
+_NO_FACE = -1
+_VARIATION = 0.06  # standard deviation of what a new attempt adds to the offsets [m]
 
 
 def _turn_by_a_third(endcap: int) -> int:
@@ -81,7 +83,8 @@ class Gait:
 
     From rest the gaits set out from faces of the first kind only. On a face of the second kind, and
     when the robot stays on one face for too long, it first tips back over the edge it would have
-    come from, by taking the shape of a face further on, and then returns to its undeformed shape.
+    come from, by taking the shape of a face further on, and then returns to its undeformed shape. A
+    new attempt at a face varies the offsets at random.
     """
 
     def __init__(
@@ -113,11 +116,12 @@ class Gait:
         self._cable_speed = cable_speed
         self._rng = rng
         self._line: tuple[FloatArray, float] | None = None
-        self._face: int | None = None
+        self._face = self._hard_face = _NO_FACE
         self._phase = _Phase.ROLLING
         self._phase_end = 0.0
         self._stuck_at = 0.0
         self._tip_back_shape = 0
+        self._variation = np.zeros(len(SIDE_CABLES))
 
     def rest_lengths(self, time: float, endcaps: FloatArray) -> FloatArray:
         """Wanted rest lengths (6,) [m] at ``time`` [s] with ``endcaps`` (6, 3) in the world [m]."""
@@ -135,12 +139,18 @@ class Gait:
     def _advance(self, face: int, time: float) -> None:
         """Note the face the robot lies on; begin and end attempts to get unstuck."""
         changed = face != self._face
-        sets_out_badly = self._face is None and face % 2 == 1
+        sets_out_badly = self._face == _NO_FACE and face % 2 == 1
         self._face = face
         if self._phase is _Phase.ROLLING:
             if changed:
                 self._stuck_at = time + _STUCK_AFTER / self._cable_speed
-            if sets_out_badly or time > self._stuck_at:
+                if face == (self._hard_face + 1) % len(FACES):
+                    self._hard_face = _NO_FACE
+            stuck = time > self._stuck_at
+            if stuck:
+                self._hard_face = face
+                self._variation = self._rng.normal(0.0, _VARIATION, len(SIDE_CABLES))
+            if stuck or sets_out_badly:
                 self._phase = _Phase.TIPPING_BACK
                 self._phase_end = time + self._rng.uniform(*_TIP_BACK) / self._cable_speed
                 ahead = int(self._rng.integers(*_TIP_BACK_AHEAD))
@@ -157,7 +167,9 @@ class Gait:
         """Offsets (6,) for ``face`` in the current phase."""
         if self._phase is _Phase.RESTING:
             return np.zeros(len(SIDE_CABLES))
-        return table[face if self._phase is _Phase.ROLLING else self._tip_back_shape]
+        if self._phase is _Phase.TIPPING_BACK:
+            return table[self._tip_back_shape]
+        return table[face] + (self._variation if face == self._hard_face else 0)
 
     def _steered(self, endcaps: FloatArray) -> FloatArray:
         """The straight gait with as much of a turn as leads back to the line of the start."""
