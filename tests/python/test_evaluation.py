@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -153,6 +155,29 @@ def test_a_different_world_frame_with_the_same_vertical_is_no_error(alignment: A
     metrics = evaluate(estimate_at(sequence, *other), sequence, alignment)
     assert metrics.ate_rmse_m == pytest.approx(0.0, abs=1e-9)
     assert metrics.initial_tilt_deg == pytest.approx(0.0, abs=1e-6)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    rotvec=st.tuples(*[st.floats(-1.5, 1.5)] * 3),
+    shift=st.tuples(*[st.floats(-1e3, 1e3)] * 3),
+    seed=st.integers(0, 100),
+)
+def test_the_world_of_the_estimate_does_not_matter(
+    rotvec: tuple[float, ...], shift: tuple[float, ...], seed: int
+) -> None:
+    """Aligned by pose, any rigid motion of the estimate's world leaves the errors as they are."""
+    position, orientation = rolling()
+    sequence = recording(position, orientation)
+    wrong = position + np.cumsum(
+        np.random.default_rng(seed).normal(0.0, 1e-3, position.shape), axis=0
+    )
+    here = compare(estimate_at(sequence, wrong, orientation), sequence)
+    other = moved(wrong, orientation, Rotation.from_rotvec(rotvec), list(shift))
+    there = compare(estimate_at(sequence, *other), sequence)
+    np.testing.assert_allclose(there.estimate.position, here.estimate.position, atol=1e-9)
+    difference = there.estimate.orientation * here.estimate.orientation.inv()
+    assert difference.magnitude().max() < 1e-9
 
 
 def test_an_initial_tilt_is_removed_by_pose_and_counted_by_yaw_alignment() -> None:
