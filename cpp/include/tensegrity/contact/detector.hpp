@@ -32,12 +32,12 @@ namespace tensegrity::contact {
 // size or estimation error is quite another.
 template <typename Scalar>
 struct DetectorParameters {
-  std::array<Scalar, 3> intercept{{Scalar(-5.3), Scalar(-1.3), Scalar(-0.1)}};  // by rank
-  Scalar height_weight = Scalar(-212);                                          // per rod length
+  std::array<Scalar, 3> intercept{{Scalar(-5.6), Scalar(-1.2), Scalar(-0.9)}};  // by rank
+  Scalar height_weight = Scalar(-217);                                          // per rod length
   Scalar share_weight = Scalar(75);
-  Scalar touch_down_rate = Scalar(0.54);  // [1/s]
-  Scalar lift_off_rate = Scalar(2.0);     // [1/s]
-  Scalar evidence_time = Scalar(0.215);   // [s]
+  Scalar touch_down_rate = Scalar(0.44);  // [1/s]
+  Scalar lift_off_rate = Scalar(2.8);     // [1/s]
+  Scalar evidence_time = Scalar(0.19);    // [s]
 };
 
 template <typename Scalar>
