@@ -9,6 +9,8 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <utility>
 
 #include "tensegrity/robot/prism.hpp"
 #include "tensegrity/types.hpp"
