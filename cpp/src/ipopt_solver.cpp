@@ -291,9 +291,6 @@ struct IpoptSolver::Impl {
   bool is_robot() {
     if (options.constraints == ConstraintSet::kAsPrinted) return true;
     const Endcaps<double> q = problem->endcaps();
-    // Ipopt may stop on the very boundary of a constraint, where two rods touch.
-    const double touching = 1e-6 * prism.rod_length;
-    if (mutual_moments(q).cwiseAbs().minCoeff() < touching) return false;
     const Handedness hand = handedness(q, prism.moment_sign());
     if (hand == Handedness::kMirrored) {
       Rods<double> rods(prism, q);

@@ -53,15 +53,17 @@ Vector3<Scalar> mutual_moments(const Endcaps<Scalar>& q) {
 enum class Handedness : std::uint8_t {
   kRight,     // the robot
   kMirrored,  // its mirror image: a reflection y -> -y repairs it and changes no length
-  kMixed,     // two rods have passed through each other: no rigid motion or reflection repairs it
+  kMixed,     // two rods touch or have passed through each other: no reflection repairs it
 };
 
-// `moment_sign`: see `Prism::moment_sign`.
+// `moment_sign`: see `Prism::moment_sign`. Rods that touch, as they do where impossible lengths
+// press the shape flat, count as crossed: the sign of their moment is rounding.
 template <typename Scalar>
 Handedness handedness(const Endcaps<Scalar>& q, Scalar moment_sign) {
+  const Scalar touching = Scalar(1e-5) * (q.col(0) - q.col(1)).norm();
   const Vector3<Scalar> signed_moments = moment_sign * mutual_moments(q);
-  if ((signed_moments.array() > 0).all()) return Handedness::kRight;
-  if ((signed_moments.array() < 0).all()) return Handedness::kMirrored;
+  if ((signed_moments.array() > touching).all()) return Handedness::kRight;
+  if ((signed_moments.array() < -touching).all()) return Handedness::kMirrored;
   return Handedness::kMixed;
 }
 

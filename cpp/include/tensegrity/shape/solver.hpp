@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include "tensegrity/robot/prism.hpp"
 #include "tensegrity/shape/cables.hpp"
@@ -71,9 +72,7 @@ class Solver {
     int iterations = best.iterations;
     if (!warm_ || handedness(best.rods.endcaps(), prism_.moment_sign()) != Handedness::kRight) {
       best = solve_cold(lengths, iterations);
-      if (handedness(best.rods.endcaps(), prism_.moment_sign()) != Handedness::kRight) {
-        return Status::kWrongChirality;
-      }
+      if (best.cost == std::numeric_limits<Scalar>::max()) return Status::kWrongChirality;
     }
     rods_ = best.rods;
     rods_.rotate_about_z(-spin_angle(rods_.endcaps(), reference_));
@@ -160,16 +159,26 @@ class Solver {
     return value > 0 ? Status::kOk : Status::kOutOfRange;
   }
 
+  // Of nine residuals that are zero but for rounding [m^2].
+  Scalar rounding_cost() const {
+    const Scalar rounding = 4 * std::numeric_limits<Scalar>::epsilon() * prism_.rod_length;
+    return 9 * rounding * rounding;
+  }
+
+  // Two minima whose costs differ by less are equally good [m^2].
+  Scalar same_cost() const {
+    const Scalar residual = Scalar(1e-6) * prism_.rod_length;
+    return 9 * residual * residual;
+  }
+
   // One descent from `start` to a local minimum.
   Solution minimise(const Rods<Scalar>& start, const CableLengths<Scalar>& lengths) const {
     const Scalar initial_damping = Scalar(1e-3);
-    const Scalar max_step =
-        Scalar(0.3) * prism_.rod_length;  // beyond it no model of second order holds
+    // Beyond this no second-order model of the lengths holds.
+    const Scalar max_step = Scalar(0.3) * prism_.rod_length;
     Solution now{start, 0, 0, false};
     Vector<Scalar, 9> residual = cable_lengths(now.rods.endcaps()) - lengths;
     now.cost = residual.squaredNorm();
-    // Rounding of one residual: a cost below nine of its squares is zero.
-    const Scalar rounding = 4 * std::numeric_limits<Scalar>::epsilon() * prism_.rod_length;
     Scalar damping = 0;
     TangentMatrix<Scalar> first_order;
     TangentMatrix<Scalar> second_order;
@@ -224,7 +233,7 @@ class Solver {
       } else {
         damping = std::max(10 * damping, initial_damping);
       }
-      if (length < options_.tolerance || now.cost < 9 * rounding * rounding) {
+      if (length < options_.tolerance || now.cost < rounding_cost()) {
         now.converged = true;
         break;
       }
@@ -232,30 +241,36 @@ class Solver {
     return now;
   }
 
-  // Best of the fixed starts that ends in a shape without crossing rods, on the branch of positive
-  // fold where there is one. The first start suffices for all but strongly deformed shapes.
+  // Best of the fixed starts that ends in a shape without crossing rods; among equally good ones
+  // the first on the branch of positive fold. One start suffices for nearly all shapes.
   Solution solve_cold(const CableLengths<Scalar>& lengths, int& iterations) const {
     // A cost as from independent errors of 1 % of a rod is no reason to look for a better minimum.
     const Scalar good_cost = 9 * Scalar(1e-4) * prism_.rod_length * prism_.rod_length;
+    // Lengths that have no solution are fitted best on the fold itself, on neither side of it.
+    const Scalar on_fold = Scalar(-0.01);
+    const Scalar sign = prism_.moment_sign();
     Solution best{rods_, std::numeric_limits<Scalar>::max(), 0, false};
-    bool found = false;
+    bool best_is_positive = false;
     for (int k = 0; k < kColdStarts; ++k) {
       Solution candidate = minimise(cold_start(prism_, k), lengths);
       iterations += candidate.iterations;
-      Handedness hand = handedness(candidate.rods.endcaps(), prism_.moment_sign());
+      Handedness hand = handedness(candidate.rods.endcaps(), sign);
       if (hand == Handedness::kMirrored) {
         candidate.rods.reflect();
         hand = Handedness::kRight;
       }
-      if (hand != Handedness::kRight || (found && candidate.cost >= best.cost)) {
-        if (!found && k == 0) best = candidate;
-        continue;
+      if (hand != Handedness::kRight) continue;
+      candidate = to_positive_fold(candidate, lengths, iterations);
+      const bool is_positive = fold(candidate.rods, sign) > on_fold;
+      const bool better = candidate.cost < best.cost - same_cost();
+      const bool as_good = candidate.cost < best.cost + same_cost();
+      if (better || (as_good && is_positive && !best_is_positive)) {
+        best = candidate;
+        best_is_positive = is_positive;
       }
-      best = candidate;
-      found = true;
-      if (best.cost < good_cost) break;
+      if (best_is_positive && best.cost < good_cost) break;
     }
-    return found ? to_positive_fold(best, lengths, iterations) : best;
+    return best;
   }
 
   // Crosses the fold from the branch of larger twist, if that is possible at no higher cost.
@@ -272,8 +287,7 @@ class Solver {
     across.retract(std::clamp(root, -limit, limit) * analysis.mechanism());
     const Solution other = minimise(across, lengths);
     iterations += other.iterations;
-    const Scalar rounding = 4 * std::numeric_limits<Scalar>::epsilon() * prism_.rod_length;
-    const bool as_good = other.cost <= solution.cost + 9 * rounding * rounding;
+    const bool as_good = other.cost < solution.cost + same_cost();
     const bool valid = handedness(other.rods.endcaps(), sign) == Handedness::kRight;
     return as_good && valid && fold(other.rods, sign) > 0 ? other : solution;
   }
