@@ -52,31 +52,28 @@ class Recorder {
       }
       py::array_t<double> a(shape);
       double* data = a.mutable_data();
-      for (std::size_t k = 0; k < states_.size(); ++k) fill(states_[k], data + py::ssize_t(k) * width);
+      for (std::size_t k = 0; k < states_.size(); ++k)
+        fill(states_[k], data + py::ssize_t(k) * width);
       out[name] = a;
     };
     using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-    const auto vector = [](const V3& v, double* to) { Eigen::Map<V3>(to) = v; };
-    const auto matrix = [](const Matrix3<double>& m, double* to) {
-      Eigen::Map<RowMajor3>{to} = m;
-    };
+    const auto vector = [](const V3& v, double* to) { Eigen::Map<V3>{to} = v; };
+    const auto matrix = [](const Matrix3<double>& m, double* to) { Eigen::Map<RowMajor3>{to} = m; };
     py::array_t<std::int64_t> t(py::ssize_t(states_.size()));
     for (std::size_t k = 0; k < states_.size(); ++k) t.mutable_data()[k] = states_[k].t;
     out["t_ns"] = t;
     column("position", {3}, [&](const State& s, double* to) { vector(s.position, to); });
     column("quaternion", {4}, [](const State& s, double* to) {
-      Eigen::Map<Eigen::Vector4d>(to) = quaternion(s.rotation);
+      Eigen::Map<Eigen::Vector4d>{to} = quaternion(s.rotation);
     });
     column("velocity", {3}, [&](const State& s, double* to) { vector(s.velocity, to); });
     column("gyro_bias", {3}, [&](const State& s, double* to) { vector(s.gyro_bias, to); });
     column("accel_bias", {3}, [&](const State& s, double* to) { vector(s.accel_bias, to); });
     column("spin", {}, [](const State& s, double* to) { *to = s.spin; });
-    column("endcaps_body", {6, 3}, [](const State& s, double* to) {
-      Eigen::Map<Endcaps<double>>(to) = s.endcaps_body;
-    });
-    column("endcaps_world", {6, 3}, [](const State& s, double* to) {
-      Eigen::Map<Endcaps<double>>(to) = s.endcaps_world;
-    });
+    column("endcaps_body", {6, 3},
+           [](const State& s, double* to) { Eigen::Map<Endcaps<double>>{to} = s.endcaps_body; });
+    column("endcaps_world", {6, 3},
+           [](const State& s, double* to) { Eigen::Map<Endcaps<double>>{to} = s.endcaps_world; });
     column("position_covariance", {3, 3},
            [&](const State& s, double* to) { matrix(s.position_covariance, to); });
     column("orientation_covariance", {3, 3},
@@ -85,7 +82,8 @@ class Recorder {
            [&](const State& s, double* to) { matrix(s.velocity_covariance, to); });
     py::array_t<bool> contacts({py::ssize_t(states_.size()), py::ssize_t(6)});
     for (std::size_t k = 0; k < states_.size(); ++k) {
-      for (std::size_t i = 0; i < 6; ++i) contacts.mutable_data()[6 * k + i] = states_[k].contacts[i];
+      for (std::size_t i = 0; i < 6; ++i)
+        contacts.mutable_data()[6 * k + i] = states_[k].contacts[i];
     }
     out["contacts"] = contacts;
     py::dict health;

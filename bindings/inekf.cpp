@@ -14,9 +14,7 @@ using RowVectors = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
 RowVectors anchors(const Belief& b) { return b.anchors.leftCols(b.anchor_count).transpose(); }
 
-Eigen::MatrixXd covariance(const Belief& b) {
-  return b.covariance.topLeftCorner(b.dim(), b.dim());
-}
+Eigen::MatrixXd covariance(const Belief& b) { return b.covariance.topLeftCorner(b.dim(), b.dim()); }
 
 void set_covariance(Belief& b, const Eigen::MatrixXd& p) {
   if (p.rows() != b.dim() || p.cols() != b.dim()) {
@@ -65,10 +63,13 @@ void bind_inekf(py::module_& m) {
                     "covariance of the error, (16 + 3 N, 16 + 3 N)")
       .def_property_readonly("position_covariance", &Belief::position_covariance)
       .def_property_readonly("velocity_covariance", &Belief::velocity_covariance)
-      .def("retract", [](Belief& b, const Eigen::VectorXd& e) {
-             if (e.size() != b.dim()) throw py::value_error("error vector: wrong length");
-             b.retract(e);
-           }, py::arg("error"), "Takes an error (16 + 3 N,) out of the mean: X <- Exp(-xi) X.")
+      .def(
+          "retract",
+          [](Belief& b, const Eigen::VectorXd& e) {
+            if (e.size() != b.dim()) throw py::value_error("error vector: wrong length");
+            b.retract(e);
+          },
+          py::arg("error"), "Takes an error (16 + 3 N,) out of the mean: X <- Exp(-xi) X.")
       .def(
           "propagate",
           [](Belief& b, const V3& gyro, const V3& accel, double dt, double gyro_std,
@@ -81,8 +82,8 @@ void bind_inekf(py::module_& m) {
           },
           py::arg("gyro"), py::arg("accel"), py::arg("dt"), py::kw_only(), py::arg("gyro_std"),
           py::arg("accel_std"), py::arg("gyro_bias_walk") = 0.0, py::arg("accel_bias_walk") = 0.0,
-          py::arg("anchor_walk") = 0.0, py::arg("spin_walk") = 0.0,
-          py::arg("rolling_radius") = 0.0, py::arg("gravity") = 9.81,
+          py::arg("anchor_walk") = 0.0, py::arg("spin_walk") = 0.0, py::arg("rolling_radius") = 0.0,
+          py::arg("gravity") = 9.81,
           "One IMU sample over dt [s]; gyro [rad/s] and accel [m/s^2] are means over the step.")
       .def(
           "augment",
