@@ -32,8 +32,7 @@ void check_group(Scalar tolerance, Scalar largest_angle) {
 
     // Adjoint: g Exp(y) g^-1 = Exp(Ad_g y).
     const Tangent y = draw(Scalar(0.5));
-    CHECK(((g * Group::Exp(y) * g.inverse()).matrix() -
-           Group::Exp(Tangent(g.Adj() * y)).matrix())
+    CHECK(((g * Group::Exp(y) * g.inverse()).matrix() - Group::Exp(Tangent(g.Adj() * y)).matrix())
               .norm() < 20 * tolerance);
 
     // Left Jacobian against central differences of Log(Exp(x + h e) Exp(x)^-1).
@@ -43,9 +42,9 @@ void check_group(Scalar tolerance, Scalar largest_angle) {
       Tangent plus = x, minus = x;
       plus[i] += h;
       minus[i] -= h;
-      const Tangent numeric = ((Group::Exp(plus) * g.inverse()).Log() -
-                               (Group::Exp(minus) * g.inverse()).Log()) /
-                              (2 * h);
+      const Tangent numeric =
+          ((Group::Exp(plus) * g.inverse()).Log() - (Group::Exp(minus) * g.inverse()).Log()) /
+          (2 * h);
       CHECK((numeric - jacobian.col(i)).norm() < 50 * h * h * (1 + x.norm()));
     }
     const auto product = jacobian * Group::left_jacobian_inverse(x);
@@ -95,4 +94,21 @@ TEST_CASE("orthonormalized removes rounding drift") {
   r += 1e-6 * tensegrity::Matrix3<double>::Ones();
   r = tensegrity::orthonormalized(r);
   CHECK((r * r.transpose() - tensegrity::Matrix3<double>::Identity()).norm() < 1e-10);
+}
+
+TEST_CASE_TEMPLATE("derivatives of Gamma_1 b and Gamma_2 b", Scalar, double, float) {
+  using V3 = tensegrity::Vector3<Scalar>;
+  const V3 b(Scalar(0.7), Scalar(-1.2), Scalar(0.4));
+  const V3 direction = V3(Scalar(0.3), Scalar(0.5), Scalar(-0.8)).normalized();
+  const Scalar h = std::cbrt(std::numeric_limits<Scalar>::epsilon());
+  for (const double angle : {1e-6, 1e-3, 0.05, 0.2, 0.3, 0.33, 0.8, 2.5}) {
+    const V3 x = Scalar(angle) * direction;
+    const tensegrity::Gamma<Scalar> gamma(x);
+    for (int i = 0; i < 3; ++i) {
+      const tensegrity::Gamma<Scalar> plus(x + h * V3::Unit(i)), minus(x - h * V3::Unit(i));
+      const V3 d1 = (plus.g1 - minus.g1) * b / (2 * h), d2 = (plus.g2 - minus.g2) * b / (2 * h);
+      CHECK((gamma.g1_derivative(b).col(i) - d1).norm() < 20 * h * h);
+      CHECK((gamma.g2_derivative(b).col(i) - d2).norm() < 20 * h * h);
+    }
+  }
 }

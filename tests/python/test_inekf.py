@@ -318,9 +318,15 @@ def test_transition_against_finite_differences(seed, radius):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_contact_measurement_against_finite_differences(seed):
-    """P H^T of the update equals the numerical derivative of z = R R_z(phi) q + p - d."""
+    """H of the update is the numerical derivative of z = R R_z(phi) q + p - d where z = 0.
+
+    Elsewhere the derivative also has a term xi_R x z, which T eq. 12 drops: H does not depend on
+    the state, and that is the point of the invariant error.
+    """
     f, ids, rng = violent_filter(seed)
     q = rng.normal(size=(6, 3))
+    spin = Rotation.from_rotvec([0, 0, f.spin])
+    q[ids] = spin.inv().apply((f.anchors - f.position) @ f.rotation)
 
     def residual(g):
         h = Rotation.from_rotvec([0, 0, g.spin]).apply(q)
@@ -337,16 +343,26 @@ def test_contact_measurement_against_finite_differences(seed):
         minus.retract(e)
         jacobian[:, i] = (residual(plus) - residual(minus)) / 2e-6
 
-    # Recover H from one update: with N = I, chi^2 and the new covariance follow from it alone.
-    h = Rotation.from_rotvec([0, 0, f.spin]).apply(q)
-    z = residual(f)
+    # What the update does to P says what H was.
     s = jacobian @ f.covariance @ jacobian.T + np.eye(9)
-    expected = f.covariance - f.covariance @ jacobian.T @ np.linalg.solve(
-        s, jacobian @ f.covariance
-    )
-    _, chi_square = f.correct_contacts(h, np.eye(18))
-    assert chi_square == pytest.approx(z @ np.linalg.solve(s, z), rel=1e-6)
+    gain = np.linalg.solve(s, jacobian @ f.covariance)
+    expected = f.covariance - f.covariance @ jacobian.T @ gain
+    status, chi_square = f.correct_contacts(spin.apply(q), np.eye(18))
+    assert status == _core.Status.OK
+    assert chi_square < 1e-20
     np.testing.assert_allclose(f.covariance, expected, atol=1e-7)
+
+
+def test_gate_rejects_and_changes_nothing():
+    f, ids, _ = violent_filter(7)
+    before = f.covariance
+    h = np.zeros((6, 3))
+    h[ids] = (f.anchors - f.position) @ f.rotation
+    h[0, 0] += 10
+    status, chi_square = f.correct_contacts(h, np.eye(18) * 1e-4, gate=27.9)
+    assert status == _core.Status.REJECTED
+    assert chi_square > 27.9
+    np.testing.assert_array_equal(f.covariance, before)
 
 
 def transform(start, yaw, shift):

@@ -62,17 +62,11 @@ void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravit
   //   xi_v+ = xi_v + g x xi_R dt      - int (v+ - alpha(t)) x R zeta_g - int R   zeta_a
   //   xi_p+ = xi_p + xi_v dt + g x xi_R dt^2/2 - int (p+ - beta(t)) x R zeta_g - int t R zeta_a
   //   xi_d+ = xi_d + r turn x (e_z x xi_R) - int (d - r e_z) x R    zeta_g
-  // alpha and beta: the velocity and position still to come from the specific force. They are
-  // cubic in t to far below rounding of the covariance (|w| dt << 1 over one sample).
-  const M3& end = belief.rotation;
-  const M3 wx = hat(w), ax = hat(a);
-  const V3 wa = w.cross(a), wwa = w.cross(wa);
-  const M3 wax = hat(wa);
-  const Scalar dt2 = dt * dt, dt3 = dt2 * dt, dt4 = dt3 * dt, dt5 = dt4 * dt;
-  const M3 alpha_r = end * (ax * (dt2 / 2) - (wax / 2 + ax * wx) * (dt3 / 3) +
-                            (hat(wwa) / 6 + wax * wx / 2 + ax * wx * wx / 2) * (dt4 / 4));
-  const M3 beta_r = end * (ax * (dt3 / 6) - (wax / 6 + ax * wx / 2) * (dt4 / 4) +
-                           (hat(wwa) / 24 + wax * wx / 6 + ax * wx * wx / 4) * (dt5 / 5));
+  // with alpha(t) and beta(t) what the specific force still adds to v and p. Their integrals are
+  // what a gyro error does to v and p through the rotation: derivatives of Gamma_1 a and Gamma_2 a.
+  const Scalar dt2 = dt * dt, dt3 = dt2 * dt, dt4 = dt3 * dt;
+  const M3 alpha_r = -dt2 * start * gamma.g1_derivative(a);
+  const M3 beta_r = -dt3 * start * gamma.g2_derivative(a);
   const M3 int_r = mean_rotation * dt;
   const M3 gx = hat(g);
   const M3 v_gyro = alpha_r - hat(belief.velocity) * int_r;
@@ -85,11 +79,12 @@ void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravit
   const int n = belief.dim();
   const Scalar gyro_bias_q = noise.gyro_bias * noise.gyro_bias * dt;
   const Scalar accel_bias_q = noise.accel_bias * noise.accel_bias * dt;
-  // Half of the bias walk before the step and half after it: their cross terms with the motion
-  // are then right to O(dt^3) without writing them down.
-  const auto half_bias_walk = [&] {
-    p.diagonal().template segment<3>(B::kGyroBias).array() += gyro_bias_q / 2;
-    p.diagonal().template segment<3>(B::kAccelBias).array() += accel_bias_q / 2;
+  // A bias that walks during the step moves the rest by Phi(t) = L t + Q t^2. A third of the walk
+  // before the step and two thirds after it make the variances right; the cross terms then lack
+  // L dt / 6 (added below).
+  const auto bias_walk = [&](Scalar part) {
+    p.diagonal().template segment<3>(B::kGyroBias).array() += part * gyro_bias_q;
+    p.diagonal().template segment<3>(B::kAccelBias).array() += part * accel_bias_q;
   };
   // Applies the transition to the rows of a matrix; with the transpose, to its columns.
   const auto transition = [&](auto&& m) {
@@ -104,46 +99,56 @@ void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravit
     }
     rows(B::kRotation) -= int_r * bg;
   };
-  half_bias_walk();
+  bias_walk(Scalar(1) / 3);
   transition(p.leftCols(n));
   transition(p.topRows(n).transpose());
-  half_bias_walk();
+  bias_walk(Scalar(2) / 3);
+  const auto add_cross = [&](int row, int column, const M3& q) {
+    p.template block<3, 3>(row, column) += q;
+    p.template block<3, 3>(column, row) += q.transpose();
+  };
+  const M3 linear_gyro = -gyro_bias_q * dt / 6 * belief.rotation;
+  add_cross(B::kRotation, B::kGyroBias, linear_gyro);
+  add_cross(B::kVelocity, B::kGyroBias, hat(belief.velocity) * linear_gyro);
+  add_cross(B::kPosition, B::kGyroBias, hat(belief.position) * linear_gyro);
+  add_cross(B::kVelocity, B::kAccelBias, -accel_bias_q * dt / 6 * belief.rotation);
+  for (int i = 0; i < belief.anchor_count; ++i) {
+    add_cross(B::anchor_index(i), B::kGyroBias,
+              hat(belief.anchors.col(i) - contact_offset) * linear_gyro);
+  }
 
   // ---- white noise. The gyro's enters like its bias, R R^T = I makes it independent of the
   // rotation: with L = (I, v_x, p_x, (d - r e_z)_x) it adds s^2 dt L L^T. v and p vary over the
   // step by alpha and beta; their mean is in L, their spread adds to the vv, vp and pp blocks.
   const Scalar gyro_q = noise.gyro * noise.gyro * dt2;
   const Scalar accel_q = noise.accel * noise.accel * dt2;
-  const V3 a0 = end * a, a1 = end * wa;
+  const V3 a0 = belief.rotation * a, a1 = belief.rotation * w.cross(a);
   const V3 v_mid = belief.velocity - (a0 * (dt / 2) - a1 * (dt2 / 6));
-  const V3 p_mid = belief.position - (a0 * (dt2 / 6) - a1 * (dt3 / 24));
-  const auto block = [&](int i, int j) { return p.template block<3, 3>(i, j); };
-  const auto add = [&](int i, int j, const M3& q) {
-    block(i, j) += q;
-    if (i != j) block(j, i) += q.transpose();
-  };
+  const V3 p_mid = belief.position - (a0 * (dt2 / 6) - a1 * (dt3 / 12));
+  const auto add_own = [&](int i, const M3& q) { p.template block<3, 3>(i, i) += q; };
   const M3 v_hat = hat(v_mid), p_hat = hat(p_mid);
   const M3 spread = gyro_q * (a0.squaredNorm() * M3::Identity() - a0 * a0.transpose());
-  add(B::kRotation, B::kRotation, gyro_q * M3::Identity());
-  add(B::kVelocity, B::kRotation, gyro_q * v_hat);
-  add(B::kPosition, B::kRotation, gyro_q * p_hat);
-  add(B::kVelocity, B::kVelocity, -gyro_q * v_hat * v_hat + spread * (dt2 / 12));
-  add(B::kPosition, B::kVelocity, -gyro_q * p_hat * v_hat + spread * (dt3 / 24));
-  add(B::kPosition, B::kPosition, -gyro_q * p_hat * p_hat + spread * (dt4 / 45));
+  add_own(B::kRotation, gyro_q * M3::Identity());
+  add_cross(B::kVelocity, B::kRotation, gyro_q * v_hat);
+  add_cross(B::kPosition, B::kRotation, gyro_q * p_hat);
+  add_own(B::kVelocity, -gyro_q * v_hat * v_hat + spread * (dt2 / 12));
+  add_cross(B::kPosition, B::kVelocity, -gyro_q * p_hat * v_hat + spread * (dt3 / 24));
+  add_own(B::kPosition, -gyro_q * p_hat * p_hat + spread * (dt4 / 45));
   for (int i = 0; i < belief.anchor_count; ++i) {
     const M3 d_hat = hat(belief.anchors.col(i) - contact_offset);
     const int at = B::anchor_index(i);
-    add(at, B::kRotation, gyro_q * d_hat);
-    add(at, B::kVelocity, -gyro_q * d_hat * v_hat);
-    add(at, B::kPosition, -gyro_q * d_hat * p_hat);
+    add_cross(at, B::kRotation, gyro_q * d_hat);
+    add_cross(at, B::kVelocity, -gyro_q * d_hat * v_hat);
+    add_cross(at, B::kPosition, -gyro_q * d_hat * p_hat);
     for (int j = 0; j < i; ++j) {
-      add(at, B::anchor_index(j), -gyro_q * d_hat * hat(belief.anchors.col(j) - contact_offset));
+      add_cross(at, B::anchor_index(j),
+                -gyro_q * d_hat * hat(belief.anchors.col(j) - contact_offset));
     }
-    add(at, at, -gyro_q * d_hat * d_hat + noise.anchor * noise.anchor * dt * M3::Identity());
+    add_own(at, -gyro_q * d_hat * d_hat + noise.anchor * noise.anchor * dt * M3::Identity());
   }
   // The accelerometer's noise is integrated once and twice.
   p.diagonal().template segment<3>(B::kVelocity).array() += accel_q;
-  add(B::kPosition, B::kVelocity, accel_q * (dt / 2) * M3::Identity());
+  add_cross(B::kPosition, B::kVelocity, accel_q * (dt / 2) * M3::Identity());
   p.diagonal().template segment<3>(B::kPosition).array() += accel_q * (dt2 / 3);
   p.diagonal().template segment<B::Extra>(B::kExtra) += extra_walk.cwiseAbs2() * dt;
   belief.symmetrize();
