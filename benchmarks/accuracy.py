@@ -35,12 +35,12 @@ from tensegrity.simulation import Manoeuvre, SimulationOptions
 Methods = dict[str, FilterConfig]
 """Configurations by the label they have in the table."""
 
-# What separates the profile `full` from `paper`, and the numbers that only the new choice reads.
+# What separates the profile `full` from `paper`, and the numbers that only this setting reads.
 _SWITCHES: dict[str, tuple[tuple[str, str], ...]] = {
     "shape": (("noises", "shape_std_rest"), ("noises", "shape_std_moving")),
     "spin": (("priors", "spin_std"), ("noises", "spin_std")),
     "contact_point": (),
-    "contact_noise": (),
+    "contact_noise": (("noises", "contact_position_std"),),
 }
 
 
@@ -116,17 +116,22 @@ def run_all(recordings: Sequence[Recording], methods: Methods, jobs: int) -> lis
 
 
 def ablation() -> Methods:
-    """``paper``, ``paper`` with one setting of ``full`` at a time, and ``full``."""
-    paper, full = FilterConfig.load("paper"), FilterConfig.load("full")
-    methods = {"paper": paper}
-    for setting, own in _SWITCHES.items():
-        values: dict[str, dict[str, Any]] = paper.model_dump()
-        for section, key in (("settings", setting), *own):
-            values[section][key] = getattr(getattr(full, section), key)
-        methods[f"paper, {setting}: {values['settings'][setting]}"] = FilterConfig.model_validate(
-            values
-        )
-    return methods | {"full": full}
+    """``paper`` and ``full``, and each of them with one setting of the other at a time."""
+    profiles = {name: FilterConfig.load(name) for name in ("paper", "full")}
+    methods: Methods = {}
+    for name, other in (("paper", "full"), ("full", "paper")):
+        methods[name] = profiles[name]
+        for setting in _SWITCHES:
+            switched = _switched(profiles[name], profiles[other], setting)
+            methods[f"{name}, {setting}: {getattr(switched.settings, setting)}"] = switched
+    return methods
+
+
+def _switched(config: FilterConfig, other: FilterConfig, setting: str) -> FilterConfig:
+    values: dict[str, dict[str, Any]] = config.model_dump()
+    for section, key in (("settings", setting), *_SWITCHES[setting]):
+        values[section][key] = getattr(getattr(other, section), key)
+    return FilterConfig.model_validate(values)
 
 
 # --- tables -------------------------------------------------------------------------------------
@@ -249,7 +254,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument(
         "--ablation",
         action="store_true",
-        help="instead of --methods: paper with one setting of full at a time",
+        help="instead of --methods: paper and full with one setting of the other at a time",
     )
     parser.add_argument("--out", type=Path, default=Path("runs/accuracy"))
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
