@@ -37,8 +37,8 @@ lint: setup ## formatters, linters, type checker, stubs
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/python -m pybind11_stubgen tensegrity._core --output-dir build/stubs --numpy-array-wrap-with-annotated --exit-code
-	diff -u python/tensegrity/_core.pyi build/stubs/tensegrity/_core.pyi
+	$(BIN)/python bindings/make_stubs.py build/_core.pyi
+	diff -u python/tensegrity/_core.pyi build/_core.pyi
 
 format: setup ## format all code
 	$(BIN)/clang-format -i $(CPP_FILES)
@@ -46,7 +46,7 @@ format: setup ## format all code
 	$(BIN)/ruff check --fix .
 
 stubs: setup ## write python/tensegrity/_core.pyi from the built module
-	$(BIN)/python -m pybind11_stubgen tensegrity._core --output-dir python --numpy-array-wrap-with-annotated --exit-code
+	$(BIN)/python bindings/make_stubs.py python/tensegrity/_core.pyi
 
 bench: setup ## microbenchmarks
 	$(BIN)/python benchmarks/estimator.py

@@ -47,7 +47,7 @@ void bind_contact(py::module_& m) {
                        "Which endcaps carry load, from their positions alone. Endcaps are (6, 3) "
                        "centres in any frame with z up [m].")
       .def(py::init<const Prism<double>&, const Parameters&>(), py::arg("robot"),
-           py::arg("parameters") = Parameters{})
+           py::arg_v("parameters", Parameters{}, "ContactDetectorParameters()"))
       .def(
           "update",
           [](Detector& detector, const EndcapRows& endcaps, double dt) {

@@ -112,7 +112,7 @@ class Recorder {
 py::tuple replay(Estimator& estimator, const Stamps& imu_t, const Doubles& gyro,
                  const Doubles& accel, const Stamps& cables_t, const Doubles& lengths,
                  const std::optional<Stamps>& contacts_t, const std::optional<Bools>& flags,
-                 const std::function<void(double)>& progress) {
+                 const std::optional<std::function<void(double)>>& progress) {
   check_rows(imu_t, "imu_t", imu_t.size(), 0);
   check_rows(gyro, "gyro", imu_t.size(), 3);
   check_rows(accel, "accel", imu_t.size(), 3);
@@ -159,7 +159,7 @@ py::tuple replay(Estimator& estimator, const Stamps& imu_t, const Doubles& gyro,
       elapsed += std::chrono::steady_clock::now() - started;
     }
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    if (progress) progress(double(end) / double(imus));
+    if (progress) (*progress)(double(end) / double(imus));
   }
   return py::make_tuple(recorder.arrays(), std::chrono::duration<double>(elapsed).count());
 }

@@ -31,7 +31,7 @@ void bind_robot(py::module_& m) {
            }),
            py::kw_only(), py::arg("rod_length") = 1.45, py::arg("imu_offset") = 0.02,
            py::arg("endcap_radius") = 0.038, py::arg("side_length") = 0.98,
-           py::arg("chirality") = Chirality::kCounterClockwise)
+           py::arg_v("chirality", Chirality::kCounterClockwise, "Chirality.COUNTER_CLOCKWISE"))
       .def_readonly("rod_length", &Prism<double>::rod_length)
       .def_readonly("imu_offset", &Prism<double>::imu_offset)
       .def_readonly("endcap_radius", &Prism<double>::endcap_radius)

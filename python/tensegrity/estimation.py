@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from tensegrity import _core
+import tensegrity._core as _core
 from tensegrity.config import FilterConfig
 from tensegrity.errors import InputError
 from tensegrity.robots import Robot

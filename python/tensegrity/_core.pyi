@@ -1,0 +1,663 @@
+"""
+C++ core of tensegrity: shape reconstruction, invariant filter, estimators.
+"""
+from __future__ import annotations
+import collections.abc
+import enum
+import numpy
+import numpy.typing
+import typing
+__all__: list[str] = ['Chirality', 'ConstraintSet', 'ContactDetector', 'ContactDetectorParameters', 'ContactNoise', 'ContactPoint', 'ImuSampling', 'InvariantFilter', 'PRISM_CABLES', 'Prism', 'PrismConfig', 'PrismEstimator', 'PrismHealth', 'PrismState', 'ShapeMethod', 'ShapeSolver', 'ShapeTracker', 'SpinMethod', 'Status', 'cable_lengths', 'endcap_jacobian', 'fold', 'in_body_frame', 'inequality_values', 'length_jacobian', 'mutual_moments', 'spin_angle']
+class Status(enum.Enum):
+    """
+    What a call did with its input.
+    """
+    DUPLICATE = ...
+    GAP = ...
+    NOT_CONVERGED = ...
+    NOT_FINITE = ...
+    NOT_INITIALIZED = ...
+    OK = ...
+    OUT_OF_ORDER = ...
+    OUT_OF_RANGE = ...
+    REJECTED = ...
+    TOO_LATE = ...
+    WRONG_CHIRALITY = ...
+class Chirality(enum.Enum):
+    """
+    The sense in which the rods twist.
+    """
+    CLOCKWISE = ...
+    COUNTER_CLOCKWISE = ...
+class Prism:
+    """
+    Geometry of a 3-bar prism [m].
+    """
+    def __init__(self, *, rod_length: typing.SupportsFloat | typing.SupportsIndex = 1.45, imu_offset: typing.SupportsFloat | typing.SupportsIndex = 0.02, endcap_radius: typing.SupportsFloat | typing.SupportsIndex = 0.038, side_length: typing.SupportsFloat | typing.SupportsIndex = 0.98, chirality: Chirality = ...) -> None:
+        ...
+    def undeformed(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 3]"]:
+        """
+        Endcaps (6, 3) of the undeformed robot in the body frame [m].
+        """
+    @property
+    def chirality(self) -> Chirality:
+        ...
+    @property
+    def endcap_radius(self) -> float:
+        ...
+    @property
+    def imu_offset(self) -> float:
+        ...
+    @property
+    def rod_length(self) -> float:
+        ...
+    @property
+    def side_length(self) -> float:
+        ...
+class ConstraintSet(enum.Enum):
+    """
+    Which inequalities of T eq. (15) a shape has to satisfy.
+    """
+    AS_PRINTED = ...
+    CORRECTED = ...
+    MUTUAL_MOMENT = ...
+class ShapeSolver:
+    """
+    Cable lengths -> endcaps by nonlinear least squares (T eq. 15a), in real time. Warm from the last solution; cold after `reset`.
+    """
+    def __init__(self, robot: Prism, *, max_iterations: typing.SupportsInt | typing.SupportsIndex = 50, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> None:
+        ...
+    def covariance(self, cable_std: typing.SupportsFloat | typing.SupportsIndex, *, prior_std: typing.SupportsFloat | typing.SupportsIndex = ...) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[18, 18]"]:
+        """
+        Covariance (18, 18) of the stacked endcaps for cable errors of `cable_std` [m], optionally with a prior of `prior_std` [m] in every tangent direction [m^2].
+        """
+    def reset(self) -> None:
+        """
+        Forgets the last solution.
+        """
+    def solve(self, lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"]) -> Status:
+        """
+        Solves for lengths (9,) [m]; unless OK or NOT_CONVERGED the shape is unchanged.
+        """
+    @property
+    def cost(self) -> float:
+        """
+        Sum of squared length residuals [m^2].
+        """
+    @property
+    def endcaps(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 3]"]:
+        """
+        (6, 3) in the body frame, spin fitted to the undeformed robot [m].
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Of the last call.
+        """
+class ShapeTracker:
+    """
+    The shape over time: an extended Kalman filter on the two free rods that stays on the branch of the shape equations a loaded robot takes.
+    """
+    def __init__(self, robot: Prism, *, gate: typing.SupportsFloat | typing.SupportsIndex = 25.0, max_dropped: typing.SupportsInt | typing.SupportsIndex = 3, max_rejections: typing.SupportsInt | typing.SupportsIndex = 10, fold_threshold: typing.SupportsFloat | typing.SupportsIndex = 0.1, fold_std: typing.SupportsFloat | typing.SupportsIndex = 0.1) -> None:
+        ...
+    def correct(self, lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"], cable_std: typing.SupportsFloat | typing.SupportsIndex, valid: typing.Annotated[collections.abc.Sequence[bool], "FixedSize(9)"] = [True, True, True, True, True, True, True, True, True]) -> Status:
+        """
+        Uses those of the lengths (9,) [m] that are valid, finite and credible.
+        """
+    def predict(self, displacement_std: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        """
+        Lets the shape drift for one step [m].
+        """
+    def reset(self, lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"], cable_std: typing.SupportsFloat | typing.SupportsIndex = 0.002) -> Status:
+        """
+        Starts from lengths (9,) alone [m]; on failure nothing changes.
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[18, 18]"]:
+        """
+        (18, 18) of the stacked endcaps [m^2].
+        """
+    @property
+    def endcaps(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 3]"]:
+        """
+        (6, 3) in the body frame, spin fitted to the undeformed robot [m].
+        """
+    @property
+    def fold(self) -> float:
+        """
+        See the function `fold`.
+        """
+    @property
+    def initialized(self) -> bool:
+        ...
+class InvariantFilter:
+    """
+    Mean on SE_{2+N}(3) x R^7 (biases and the spin angle) and covariance of the right-invariant error (rotation, velocity, position, gyro bias, accelerometer bias, spin, contacts).
+    """
+    def __init__(self) -> None:
+        ...
+    def augment(self, id: typing.SupportsInt | typing.SupportsIndex, h: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], h_covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> bool:
+        """
+        Adds the contact point d = p + R h of an endcap; h (3,) body [m].
+        """
+    def correct_contacts(self, h: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"], covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[18, 18]"], gate: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> tuple[Status, float]:
+        """
+        Corrects with all contact points; h (6, 3) endcaps in the body frame after the spin [m], covariance (18, 18) [m^2]. Returns (status, chi square).
+        """
+    def marginalise(self, id: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Drops the contact point of an endcap.
+        """
+    def propagate(self, gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], dt: typing.SupportsFloat | typing.SupportsIndex, *, gyro_std: typing.SupportsFloat | typing.SupportsIndex, accel_std: typing.SupportsFloat | typing.SupportsIndex, gyro_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, accel_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, anchor_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, spin_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, rolling_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, gravity: typing.SupportsFloat | typing.SupportsIndex = 9.81) -> None:
+        """
+        One IMU sample over dt [s]; gyro [rad/s] and accel [m/s^2] are means over the step.
+        """
+    def retract(self, error: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        """
+        Takes an error (16 + 3 N,) out of the mean: X <- Exp(-xi) X.
+        """
+    @property
+    def accel_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        b_a (3,), body [m/s^2]
+        """
+    @accel_bias.setter
+    def accel_bias(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def anchor_ids(self) -> list[int]:
+        """
+        endcap of each contact point
+        """
+    @property
+    def anchors(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        contact points (N, 3), world [m]
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        covariance of the error, (16 + 3 N, 16 + 3 N)
+        """
+    @covariance.setter
+    def covariance(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> None:
+        ...
+    @property
+    def gyro_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        b_g (3,), body [rad/s]
+        """
+    @gyro_bias.setter
+    def gyro_bias(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        p (3,), world [m]
+        """
+    @position.setter
+    def position(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def position_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        ...
+    @property
+    def rotation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        R (3, 3), body to world
+        """
+    @rotation.setter
+    def rotation(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> None:
+        ...
+    @property
+    def spin(self) -> float:
+        """
+        phi [rad]
+        """
+    @spin.setter
+    def spin(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def velocity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        v (3,), world [m/s]
+        """
+    @velocity.setter
+    def velocity(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def velocity_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        ...
+class ContactDetectorParameters:
+    """
+    Weights of the geometry and rates of the two-state Markov process; the defaults are the fitted ones.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def evidence_time(self) -> float:
+        """
+        how long errors of the endcap positions persist [s]
+        """
+    @evidence_time.setter
+    def evidence_time(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def height_weight(self) -> float:
+        """
+        log odds per height above the lowest endcap in rod lengths
+        """
+    @height_weight.setter
+    def height_weight(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def intercept(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
+        """
+        log odds of the lowest, the second, and the third and higher endcaps, (3,)
+        """
+    @intercept.setter
+    def intercept(self, arg0: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]) -> None:
+        ...
+    @property
+    def lift_off_rate(self) -> float:
+        """
+        [1/s]
+        """
+    @lift_off_rate.setter
+    def lift_off_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def share_weight(self) -> float:
+        """
+        log odds per share of the weight
+        """
+    @share_weight.setter
+    def share_weight(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def touch_down_rate(self) -> float:
+        """
+        [1/s]
+        """
+    @touch_down_rate.setter
+    def touch_down_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class ContactDetector:
+    """
+    Which endcaps carry load, from their positions alone. Endcaps are (6, 3) centres in any frame with z up [m].
+    """
+    def __init__(self, robot: Prism, parameters: ContactDetectorParameters = ...) -> None:
+        ...
+    def probabilities(self, endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dt: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Updates with every sample of endcaps (N, 6, 3), dt [s] apart; returns (N, 6).
+        """
+    def reset(self) -> None:
+        """
+        Forgets everything before the next update.
+        """
+    def update(self, endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"], dt: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[list[bool], "FixedSize(6)"]:
+        """
+        One sample, dt [s] after the last one; returns six flags. Input that is not finite, or a negative dt, keeps the last decision.
+        """
+    @property
+    def probability(self) -> typing.Annotated[list[float], "FixedSize(6)"]:
+        """
+        Of being loaded, six numbers after the last update.
+        """
+class ShapeMethod(enum.Enum):
+    LEAST_SQUARES = ...
+    TRACKER = ...
+class SpinMethod(enum.Enum):
+    ESTIMATED = ...
+    FIXED = ...
+class ContactPoint(enum.Enum):
+    CENTRE = ...
+    ROLLING = ...
+class ContactNoise(enum.Enum):
+    CONSTANT = ...
+    FROM_SHAPE = ...
+class ImuSampling(enum.Enum):
+    INSTANTANEOUS = ...
+    INTERVAL_MEAN = ...
+class PrismConfig:
+    """
+    Settings, priors and noises of the prism's estimator.
+    """
+    contact_noise: ContactNoise
+    contact_point: ContactPoint
+    imu_sampling: ImuSampling
+    shape: ShapeMethod
+    spin: SpinMethod
+    static_bias_initialization: bool
+    def __init__(self) -> None:
+        ...
+    @property
+    def accelerometer_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        ...
+    @accelerometer_bias.setter
+    def accelerometer_bias(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def accelerometer_bias_std(self) -> float:
+        ...
+    @accelerometer_bias_std.setter
+    def accelerometer_bias_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accelerometer_bias_walk(self) -> float:
+        ...
+    @accelerometer_bias_walk.setter
+    def accelerometer_bias_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def accelerometer_std(self) -> float:
+        ...
+    @accelerometer_std.setter
+    def accelerometer_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def cable_std(self) -> float:
+        ...
+    @cable_std.setter
+    def cable_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def chi_square_gate(self) -> float:
+        ...
+    @chi_square_gate.setter
+    def chi_square_gate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def contact_position_std(self) -> float:
+        ...
+    @contact_position_std.setter
+    def contact_position_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def contact_std(self) -> float:
+        ...
+    @contact_std.setter
+    def contact_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gravity(self) -> float:
+        ...
+    @gravity.setter
+    def gravity(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyroscope_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        ...
+    @gyroscope_bias.setter
+    def gyroscope_bias(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    @property
+    def gyroscope_bias_std(self) -> float:
+        ...
+    @gyroscope_bias_std.setter
+    def gyroscope_bias_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyroscope_bias_walk(self) -> float:
+        ...
+    @gyroscope_bias_walk.setter
+    def gyroscope_bias_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def gyroscope_std(self) -> float:
+        ...
+    @gyroscope_std.setter
+    def gyroscope_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def init_bias_size(self) -> int:
+        ...
+    @init_bias_size.setter
+    def init_bias_size(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_imu_gap(self) -> float:
+        ...
+    @max_imu_gap.setter
+    def max_imu_gap(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_latency(self) -> float:
+        ...
+    @max_latency.setter
+    def max_latency(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def orientation_std(self) -> float:
+        ...
+    @orientation_std.setter
+    def orientation_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def position_std(self) -> float:
+        ...
+    @position_std.setter
+    def position_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def shape_std_moving(self) -> float:
+        ...
+    @shape_std_moving.setter
+    def shape_std_moving(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def shape_std_rest(self) -> float:
+        ...
+    @shape_std_rest.setter
+    def shape_std_rest(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def spin_prior_std(self) -> float:
+        ...
+    @spin_prior_std.setter
+    def spin_prior_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def spin_walk(self) -> float:
+        ...
+    @spin_walk.setter
+    def spin_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def static_accel_limit(self) -> float:
+        ...
+    @static_accel_limit.setter
+    def static_accel_limit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def static_gyro_limit(self) -> float:
+        ...
+    @static_gyro_limit.setter
+    def static_gyro_limit(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def velocity_std(self) -> float:
+        ...
+    @velocity_std.setter
+    def velocity_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class PrismHealth:
+    """
+    Counters since construction; see the C++ header.
+    """
+    @property
+    def cables_dropped(self) -> int:
+        ...
+    @property
+    def contacts_dropped(self) -> int:
+        ...
+    @property
+    def contacts_rejected(self) -> int:
+        ...
+    @property
+    def imu_dropped(self) -> int:
+        ...
+    @property
+    def imu_gaps(self) -> int:
+        ...
+    @property
+    def shape_failures(self) -> int:
+        ...
+class PrismState:
+    """
+    One state of the prism, in SI units.
+    """
+    @property
+    def accel_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        (3,), body [m/s^2]
+        """
+    @property
+    def contacts(self) -> typing.Annotated[list[bool], "FixedSize(6)"]:
+        """
+        endcaps held as contacts
+        """
+    @property
+    def endcap_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[18, 18]"]:
+        """
+        (18, 18), body [m^2]
+        """
+    @property
+    def endcaps_body(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 3]"]:
+        """
+        (6, 3) [m]
+        """
+    @property
+    def endcaps_world(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 3]"]:
+        """
+        (6, 3) [m]
+        """
+    @property
+    def gyro_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        (3,), body [rad/s]
+        """
+    @property
+    def health(self) -> PrismHealth:
+        ...
+    @property
+    def initialized(self) -> bool:
+        ...
+    @property
+    def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        (3,), world [m]
+        """
+    @property
+    def position_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        (3, 3) [m^2]
+        """
+    @property
+    def quaternion(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 1]"]:
+        """
+        (4,) x y z w
+        """
+    @property
+    def rotation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        (3, 3), body to world
+        """
+    @property
+    def rotation_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        (3, 3), world [rad^2]
+        """
+    @property
+    def spin(self) -> float:
+        """
+        phi [rad]
+        """
+    @property
+    def spin_variance(self) -> float:
+        """
+        [rad^2]
+        """
+    @property
+    def t(self) -> int:
+        """
+        stamp [ns]
+        """
+    @property
+    def velocity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        (3,), world [m/s]
+        """
+    @property
+    def velocity_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        (3, 3) [m^2/s^2]
+        """
+class PrismEstimator:
+    """
+    Streaming estimator: IMU, cables and contacts in, state out.
+    """
+    def __init__(self, robot: Prism, config: PrismConfig) -> None:
+        ...
+    def cables(self, t: typing.SupportsInt | typing.SupportsIndex, lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"]) -> Status:
+        """
+        Cable lengths: t [ns], (9,) [m] in the order of PRISM_CABLES.
+        """
+    def contacts(self, t: typing.SupportsInt | typing.SupportsIndex, flags: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> Status:
+        """
+        Contact flags: t [ns], (6,) true on the ground.
+        """
+    def imu(self, t: typing.SupportsInt | typing.SupportsIndex, gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> Status:
+        """
+        One IMU sample: t [ns], angular velocity (3,) [rad/s], specific force (3,) [m/s^2].
+        """
+    def replay(self, imu_t: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cables_t: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], contacts_t: typing.Annotated[numpy.typing.ArrayLike, numpy.int64] | None = None, flags: typing.Annotated[numpy.typing.ArrayLike, numpy.bool] | None = None, progress: collections.abc.Callable[[float], None] | None = None) -> tuple:
+        """
+        Feeds a whole recording and returns (arrays by name, seconds in the estimator).
+        """
+    @property
+    def filter(self) -> InvariantFilter:
+        """
+        A copy of the invariant filter's mean and covariance.
+        """
+    @property
+    def initialized(self) -> bool:
+        ...
+    @property
+    def state(self) -> PrismState:
+        ...
+def cable_lengths(endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 1]"]:
+    """
+    Distances (9,) of endcaps (6, 3) in the order of PRISM_CABLES [m].
+    """
+def endcap_jacobian(robot: Prism, endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[18, 10]"]:
+    """
+    dq/dtangent (18, 10) of the stacked endcaps, same tangent as `length_jacobian`.
+    """
+def fold(robot: Prism, endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"]) -> float:
+    """
+    Side and distance of the fold of the shape equations: positive on the branch a standing robot takes, zero where two branches meet. Dimensionless.
+    """
+def in_body_frame(robot: Prism, endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 3]"]:
+    """
+    Endcaps (6, 3) given in any frame, moved rigidly to the body frame and turned about z to fit the undeformed robot best [m].
+    """
+def inequality_values(robot: Prism, endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"], constraints: ConstraintSet) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+    """
+    Left-hand sides of the inequalities of T eq. (15) [m, m^2 or m^3], all positive for a shape that satisfies them. Printed and corrected set: 15d (2), 15e (2), 15g to 15l; mutual moments: three.
+    """
+def length_jacobian(robot: Prism, endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 10]"]:
+    """
+    dl/dtangent (9, 10) at endcaps (6, 3) in the body frame; the tangent is (dc23, L/2 du23, dc45, L/2 du45), all in metres.
+    """
+def mutual_moments(endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+    """
+    m_ij = (c_j - c_i) . (u_i x u_j) (3,) of the rod pairs (01, 23), (23, 45), (45, 01) [m]: all negative for a counter-clockwise robot, zero where two rod axes cross.
+    """
+def spin_angle(endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"], reference: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"]) -> float:
+    """
+    Angle about body z by which `reference` has to be turned to fit `endcaps` best over endcaps 2 to 5 [rad].
+    """
+PRISM_CABLES: tuple = ((0, 4), (0, 2), (2, 4), (1, 5), (1, 3), (3, 5), (1, 4), (0, 3), (2, 5))
+__version__: str = '0.1.0'
