@@ -5,8 +5,6 @@
 #include <limits>
 #include <string>
 
-#include <pybind11/native_enum.h>
-
 #include "bindings.hpp"
 #include "tensegrity/shape/cables.hpp"
 #include "tensegrity/shape/constraints.hpp"
