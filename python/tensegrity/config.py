@@ -82,7 +82,9 @@ class Noises(StrictModel):
     cable_std: float = field("cable length, one sample", unit="m", gt=0)
     contact_std: float = field("random walk of a contact point", unit="m/sqrt(s)", ge=0)
     contact_position_std: float = field(
-        "position of a contact, with contact_noise: constant", unit="m", gt=0
+        "contact kinematics; contact_noise: from_shape adds the shape's covariance",
+        unit="m",
+        gt=0,
     )
     spin_std: float = field(
         "random walk of the spin, with spin: estimated", unit="rad/sqrt(s)", ge=0
