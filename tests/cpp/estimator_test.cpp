@@ -2,51 +2,13 @@
 // state after any input. Accuracy is tested from Python on whole recordings.
 #include <doctest/doctest.h>
 
+#include <Eigen/Eigenvalues>
 #include <cstdlib>
 #include <limits>
-#include <new>
 #include <random>
 
+#include "allocations.hpp"
 #include "tensegrity/estimator/prism_estimator.hpp"
-
-// ---- every way to the heap is counted
-
-namespace {
-thread_local long allocations = 0;
-thread_local bool counting = false;
-}  // namespace
-
-extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t count, std::size_t size);
-void* __libc_realloc(void* pointer, std::size_t size);
-void* __libc_memalign(std::size_t alignment, std::size_t size);
-
-void* malloc(std::size_t size) {
-  if (counting) ++allocations;
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t count, std::size_t size) {
-  if (counting) ++allocations;
-  return __libc_calloc(count, size);
-}
-void* realloc(void* pointer, std::size_t size) {
-  if (counting) ++allocations;
-  return __libc_realloc(pointer, size);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t size) {
-  if (counting) ++allocations;
-  return __libc_memalign(alignment, size);
-}
-}
-
-void* operator new(std::size_t size) {
-  void* pointer = malloc(size);
-  if (pointer == nullptr) std::abort();
-  return pointer;
-}
-void operator delete(void* pointer) noexcept { free(pointer); }
-void operator delete(void* pointer, std::size_t) noexcept { free(pointer); }
 
 namespace {
 
@@ -141,20 +103,19 @@ TEST_CASE("the hot path never touches the heap") {
   for (const auto& config : {PrismConfig<double>(), full_config<double>()}) {
     Shaken<double> world;
     PrismEstimator<double> estimator(world.robot, config);
-    allocations = 0;
-    counting = true;
+    const long before = tensegrity::testing::allocations();
     world.run(estimator, 0, 500, true);      // the start
     world.run(estimator, 500, 2500, false);  // propagation, anchors in and out, gates
     const auto state = estimator.state();
-    counting = false;
+    const long counted = tensegrity::testing::allocations() - before;
     CHECK(state.initialized);
-    CHECK(allocations == 0);
+    CHECK(counted == 0);
     // The counter itself works.
-    counting = true;
-    std::free(std::malloc(8));
-    delete new int(3);
-    counting = false;
-    CHECK(allocations >= 2);
+    void* volatile block = std::malloc(8);
+    std::free(block);
+    int* volatile number = new int(3);
+    delete number;
+    CHECK(tensegrity::testing::allocations() >= before + counted + 2);
   }
 }
 

@@ -4,25 +4,11 @@
 #include <doctest/doctest.h>
 
 #include <Eigen/Eigenvalues>
-#include <atomic>
 #include <cstdlib>
 #include <limits>
 
+#include "allocations.hpp"
 #include "shape_samples.hpp"
-
-// Every allocation of the test program passes here, whatever the build type. A sanitizer that has
-// its own malloc is left alone.
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define TENSEGRITY_COUNT_ALLOCATIONS
-namespace {
-std::atomic<long> allocations{0};
-}
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) {
-  ++allocations;
-  return __libc_malloc(size);
-}
-#endif
 
 namespace tensegrity::shape {
 namespace {
@@ -233,7 +219,6 @@ TEST_CASE("statuses say why a correction was not made") {
   CHECK(tracker.correct(CableLengths<double>::Constant(-1), kCableStd) == Status::kOutOfRange);
 }
 
-#ifdef TENSEGRITY_COUNT_ALLOCATIONS
 TEST_CASE_TEMPLATE("solving and tracking allocate no memory", Scalar, double, float) {
   const Prism<double> prism;
   Walk walk(prism, 65);
@@ -241,7 +226,7 @@ TEST_CASE_TEMPLATE("solving and tracking allocate no memory", Scalar, double, fl
   Solver<Scalar> solver{Prism<Scalar>{}};
   Tracker<Scalar> tracker{Prism<Scalar>{}};
   Matrix<Scalar, 18> covariance;
-  const long before = allocations;
+  const long before = tensegrity::testing::allocations();
   solver.solve(lengths);
   solver.solve(lengths);
   solver.covariance(Scalar(0.002), covariance);
@@ -251,14 +236,13 @@ TEST_CASE_TEMPLATE("solving and tracking allocate no memory", Scalar, double, fl
   tracker.predict(Scalar(0.001));
   tracker.correct(lengths, Scalar(0.002));
   covariance = tracker.covariance();
-  const long counted = allocations - before;
+  const long counted = tensegrity::testing::allocations() - before;
   CHECK(counted == 0);
   // The counter counts.
   void* volatile block = std::malloc(1);
   std::free(block);
-  CHECK(allocations > before + counted);
+  CHECK(tensegrity::testing::allocations() > before + counted);
 }
-#endif
 
 }  // namespace
 }  // namespace tensegrity::shape

@@ -53,7 +53,7 @@ struct Prism {
   Vector3<Scalar> endcap1() const { return {0, 0, -rod_length / 2 - imu_offset}; }
 
   // Endcaps of the undeformed robot in the body frame [m]: even endcaps at angle 120 deg * k on a
-  // circle at z = +h/2, odd ones at 120 deg * k - 150 deg at z = -h/2 (design §3.3), then turned
+  // circle at z = +h/2, odd ones at 120 deg * k - 150 deg at z = -h/2, then turned
   // so that r01 is the body z axis. The spin about z is the reference for every spin angle.
   Endcaps<Scalar> undeformed() const {
     const Scalar radius = side_length / std::sqrt(Scalar(3));
