@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,7 +175,14 @@ def shape_timings(sequence: Sequence, repeats: int) -> Iterator[Timing]:
         yield Timing("`IpoptShapeSolver`, cold", per_call(cold(reference), few, repeats))
 
 
-def cold(solver: _core.ShapeSolver | _core.IpoptShapeSolver) -> Callable[[Lengths], object]:
+class Solver(Protocol):
+    """What the shape solvers have in common; a build may lack Ipopt's."""
+
+    def reset(self) -> None: ...
+    def solve(self, lengths: Lengths) -> object: ...
+
+
+def cold(solver: Solver) -> Callable[[Lengths], object]:
     """``solver.solve`` that does not start from the last solution."""
 
     def solve(sample: Lengths) -> object:

@@ -2,7 +2,7 @@
 
     python 02_recording.py [RECORDING]
 
-Without a recording, two metres of rolling are simulated and written to `rolling/` first.
+Without a recording, one metre of rolling is simulated and written to `rolling/` first.
 """
 
 import sys
@@ -17,7 +17,7 @@ if len(sys.argv) > 1:
     recording = Path(sys.argv[1])
 else:
     recording = Path("rolling")
-    simulated = simulate("forward", SimulationOptions(seed=1, path_length=2.0))
+    simulated = simulate("forward", SimulationOptions(seed=1, path_length=1.0))
     tensegrity.sequence.write(simulated, recording, overwrite=True)
 
 sequence = tensegrity.sequence.read(recording)
