@@ -123,6 +123,8 @@ def ablation() -> Methods:
         methods[name] = profiles[name]
         for setting in _SWITCHES:
             switched = _switched(profiles[name], profiles[other], setting)
+            if switched == profiles[name]:
+                continue  # contact noise from the shape means nothing without a tracked shape
             methods[f"{name}, {setting}: {getattr(switched.settings, setting)}"] = switched
     return methods
 
@@ -131,6 +133,8 @@ def _switched(config: FilterConfig, other: FilterConfig, setting: str) -> Filter
     values: dict[str, dict[str, Any]] = config.model_dump()
     for section, key in (("settings", setting), *_SWITCHES[setting]):
         values[section][key] = getattr(getattr(other, section), key)
+    if values["settings"]["shape"] == "least_squares":
+        values["settings"]["contact_noise"] = "constant"
     return FilterConfig.model_validate(values)
 
 

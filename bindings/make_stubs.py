@@ -21,7 +21,8 @@ def generate() -> str:
     with tempfile.TemporaryDirectory() as directory:
         command = [sys.executable, "-m", "pybind11_stubgen", MODULE, "--output-dir", directory]
         command += ["--numpy-array-wrap-with-annotated", "--exit-code"]
-        command += ["--enum-class-locations", f"Chirality:{MODULE}"]
+        for enum in ("Chirality", "ConstraintSet"):  # that stand as defaults of arguments
+            command += ["--enum-class-locations", f"{enum}:{MODULE}"]
         subprocess.run(command, check=True)
         return (Path(directory) / MODULE.replace(".", "/")).with_suffix(".pyi").read_text()
 

@@ -193,7 +193,8 @@ void bind_ipopt(py::module_& m) {
              return Solver(robot, Options{constraints, tolerance, max_iterations});
            }),
            py::arg("robot"), py::kw_only(),
-           py::arg("constraints") = shape::ConstraintSet::kMutualMoment,
+           py::arg_v("constraints", shape::ConstraintSet::kMutualMoment,
+                     "ConstraintSet.MUTUAL_MOMENT"),
            py::arg("tolerance") = Options{}.tolerance,
            py::arg("max_iterations") = Options{}.max_iterations)
       .def("solve", &Solver::solve, py::arg("lengths"),

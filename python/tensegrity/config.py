@@ -9,10 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tensegrity.packaged import PackagedModels
-from tensegrity.yaml_model import StrictModel, dump, field
+from tensegrity.yaml_model import StrictModel, dump, field, inconsistent
 
 DEFAULT = "full"
 """The profile of files that name none."""
@@ -53,6 +53,17 @@ class Settings(StrictModel):
         "probability mass of innovations that are accepted, 0: all", ge=0, lt=1
     )
     gravity: float = field("acceleration of gravity, downward", unit="m/s^2", gt=0)
+
+    @model_validator(mode="after")
+    def _shape_has_a_covariance(self) -> Settings:
+        if self.contact_noise == "from_shape" and self.shape != "tracker":
+            raise inconsistent(
+                "contact_noise: from_shape needs shape: tracker, least squares of one sample have "
+                "no useful covariance at the fold",
+                "contact_noise",
+                "shape",
+            )
+        return self
 
 
 class Priors(StrictModel):

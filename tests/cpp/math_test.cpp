@@ -36,7 +36,7 @@ void check_group(Scalar tolerance, Scalar largest_angle) {
               .norm() < 20 * tolerance);
 
     // Left Jacobian against central differences of Log(Exp(x + h e) Exp(x)^-1).
-    const auto jacobian = Group::left_jacobian(x);
+    const tensegrity::Matrix<Scalar, Group::Dof> jacobian = Group::left_jacobian(x);
     const Scalar h = std::cbrt(std::numeric_limits<Scalar>::epsilon());
     for (int i = 0; i < Group::Dof; ++i) {
       Tangent plus = x, minus = x;
@@ -47,8 +47,10 @@ void check_group(Scalar tolerance, Scalar largest_angle) {
           (2 * h);
       CHECK((numeric - jacobian.col(i)).norm() < 50 * h * h * (1 + x.norm()));
     }
-    const auto product = jacobian * Group::left_jacobian_inverse(x);
-    CHECK((product - decltype(jacobian)::Identity()).norm() < 20 * tolerance * (1 + x.norm()));
+    const tensegrity::Matrix<Scalar, Group::Dof> product =
+        jacobian * Group::left_jacobian_inverse(x);
+    CHECK((product - tensegrity::Matrix<Scalar, Group::Dof>::Identity()).norm() <
+          20 * tolerance * (1 + x.norm()));
   }
 }
 

@@ -119,6 +119,12 @@ def test_every_setting_reaches_the_core():
     assert fields - 1 == sum(not n.startswith("_") for n in dir(core))  # `method` is a label
 
 
+def test_defaults_of_the_core_are_the_paper_profile():
+    default, paper = _core.PrismConfig(), core_config(FilterConfig.load("paper"))
+    for name in (n for n in dir(default) if not n.startswith("_")):
+        np.testing.assert_array_equal(getattr(default, name), getattr(paper, name), err_msg=name)
+
+
 @pytest.mark.parametrize("chirality", ["counter_clockwise", "clockwise"])
 def test_python_and_cpp_agree_on_the_undeformed_robot(chirality):
     robot = robots.load("prism3").model_copy(update={"chirality": chirality})

@@ -1,7 +1,7 @@
 // Everything that can be set about the prism's estimator, in one plain struct.
 //
-// The defaults are T's method ("paper"). Python fills this struct from YAML, where every field has
-// the same name (python/tensegrity/config.py).
+// The defaults are T's method, the packaged profile `paper`. Python fills this struct from YAML,
+// where every field has the same name (python/tensegrity/config.py).
 #pragma once
 
 #include <cstdint>
@@ -49,11 +49,11 @@ struct PrismConfig {
   Scalar gravity = Scalar(9.81);            // [m/s^2]
 
   // priors: standard deviations at the start
-  Scalar orientation_std = Scalar(0.5);                          // roll and pitch [rad]
-  Scalar velocity_std = Scalar(0.05);                            // [m/s]
-  Scalar position_std = Scalar(0);                               // [m]
+  Scalar orientation_std = Scalar(0.02);                         // roll and pitch [rad]
+  Scalar velocity_std = Scalar(0.01);                            // [m/s]
+  Scalar position_std = Scalar(0.001);                           // [m]
   Vector3<Scalar> gyroscope_bias = Vector3<Scalar>::Zero();      // [rad/s]
-  Scalar gyroscope_bias_std = Scalar(0.02);                      // [rad/s]
+  Scalar gyroscope_bias_std = Scalar(0.005);                     // [rad/s]
   Vector3<Scalar> accelerometer_bias = Vector3<Scalar>::Zero();  // [m/s^2]
   Scalar accelerometer_bias_std = Scalar(0.05);                  // [m/s^2]
   Scalar spin_prior_std = Scalar(0.1);                           // [rad]
@@ -65,9 +65,9 @@ struct PrismConfig {
   Scalar accelerometer_bias_walk = Scalar(0.001);  // [m/s^2/sqrt(s)]
   Scalar cable_std = Scalar(0.002);                // [m]
   Scalar contact_std = Scalar(0.05);               // random walk of a contact point [m/sqrt(s)]
-  Scalar contact_position_std = Scalar(0.02);      // contact kinematics, white part [m]
-  Scalar spin_walk = Scalar(0.05);                 // [rad/sqrt(s)]
-  Scalar shape_std_rest = Scalar(0.001);           // shape at rest [m/sqrt(s)]
+  Scalar contact_position_std = Scalar(0.05);      // contact kinematics, white part [m]
+  Scalar spin_walk = Scalar(0.1);                  // [rad/sqrt(s)]
+  Scalar shape_std_rest = Scalar(0.01);            // shape at rest [m/sqrt(s)]
   Scalar shape_std_moving = Scalar(0.1);           // shape while rolling or falling [m/sqrt(s)]
 };
 
