@@ -7,7 +7,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Chirality', 'ConstraintSet', 'ContactDetector', 'ContactDetectorParameters', 'ContactNoise', 'ContactPoint', 'ImuSampling', 'InvariantFilter', 'PRISM_CABLES', 'Prism', 'PrismConfig', 'PrismEstimator', 'PrismHealth', 'PrismState', 'ShapeMethod', 'ShapeSolver', 'ShapeTracker', 'SpinMethod', 'Status', 'cable_lengths', 'endcap_jacobian', 'fold', 'in_body_frame', 'inequality_values', 'length_jacobian', 'mutual_moments', 'spin_angle']
+__all__: list[str] = ['Chirality', 'ConstraintSet', 'ContactDetector', 'ContactDetectorParameters', 'ContactNoise', 'ContactPoint', 'ImuSampling', 'InvariantFilter', 'IpoptShapeSolver', 'PRISM_CABLES', 'Prism', 'PrismConfig', 'PrismEstimator', 'PrismHealth', 'PrismState', 'ShapeMethod', 'ShapeSolver', 'ShapeTracker', 'SpinMethod', 'Status', 'cable_lengths', 'endcap_jacobian', 'fold', 'in_body_frame', 'inequality_values', 'length_jacobian', 'mutual_moments', 'spin_angle']
 class Status(enum.Enum):
     """
     What a call did with its input.
@@ -130,6 +130,35 @@ class ShapeTracker:
     @property
     def initialized(self) -> bool:
         ...
+class IpoptShapeSolver:
+    """
+    Cable lengths -> endcaps by T eq. (15) with Ipopt: the reference for ShapeSolver, about a thousand times slower.
+    """
+    def __init__(self, robot: Prism, *, constraints: ConstraintSet = ..., tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-09, max_iterations: typing.SupportsInt | typing.SupportsIndex = 300) -> None:
+        ...
+    def reset(self) -> None:
+        """
+        Forgets the last solution.
+        """
+    def solve(self, lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"]) -> Status:
+        """
+        Solves for lengths (9,) [m]; unless OK the shape is unchanged.
+        """
+    @property
+    def cost(self) -> float:
+        """
+        Sum of squared length residuals [m^2].
+        """
+    @property
+    def endcaps(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 3]"]:
+        """
+        (6, 3) in the body frame, spin fitted to the undeformed robot [m].
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Of the last call, all starts.
+        """
 class InvariantFilter:
     """
     Mean on SE_{2+N}(3) x R^7 (biases and the spin angle) and covariance of the right-invariant error (rotation, velocity, position, gyro bias, accelerometer bias, spin, contacts).
