@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tensegrity import __version__
 from tensegrity.config import FilterConfig
 from tensegrity.errors import InputError
 from tensegrity.files import new_directory
@@ -70,7 +70,7 @@ def write_run(
     trajectory is not finite.
     """
     info = RunInfo(
-        version=_version(),
+        version=__version__,
         sequence=str(sequence),
         runtime_s=trajectory.runtime_s,
         info={key: _scalar(value) for key, value in trajectory.info.items()},
@@ -207,10 +207,3 @@ def _scalar(value: Any) -> bool | int | float | str:
     if isinstance(value, np.generic):
         value = value.item()
     return value if isinstance(value, bool | int | float | str) else str(value)
-
-
-def _version() -> str:
-    try:
-        return importlib.metadata.version("tensegrity-estimation")
-    except importlib.metadata.PackageNotFoundError:
-        return "not installed"  # used from a source tree
