@@ -101,6 +101,18 @@ def drop_column(file: str, column: int) -> Edit:
     return _in_file(file, edit)
 
 
+def empty_columns(file: str, first: int) -> Edit:
+    """Empty all cells from column ``first`` on, in all lines but the header."""
+
+    def edit(path: Path) -> None:
+        header, *rows = _lines(path)
+        cells = (row.rstrip("\n").split(",") for row in rows)
+        emptied = (",".join(c[:first] + [""] * (len(c) - first)) + "\n" for c in cells)
+        path.write_text(header + "".join(emptied))
+
+    return _in_file(file, edit)
+
+
 def keep_lines(file: str, count: int) -> Edit:
     """Keep the first lines only."""
     return _in_file(file, lambda path: path.write_text("".join(_lines(path)[:count])))
@@ -170,6 +182,12 @@ MALFORMED_SEQUENCES = [
     ),
     MalformedSequence(
         "only comments", "groundtruth.tum", set_text("groundtruth.tum", "# t x\n"), "no samples"
+    ),
+    MalformedSequence(
+        "no cable ever measured",
+        "cables.csv",
+        empty_columns("cables.csv", 1),
+        "but those of 't_ns'",
     ),
     # headers
     MalformedSequence(
@@ -287,6 +305,78 @@ MALFORMED_SEQUENCES = [
         "[m/s^2], got ''",
         line=4,
         field="accel_z",
+    ),
+    MalformedSequence(
+        "empty stamp",
+        "cables.csv",
+        set_cell("cables.csv", 4, 0, ""),
+        "a whole number [ns], got ''",
+        line=4,
+        field="t_ns",
+    ),
+    MalformedSequence(
+        "empty contact flag",
+        "contacts.csv",
+        set_cell("contacts.csv", 4, 6, ""),
+        "0 or 1, got ''",
+        line=4,
+        field="c_5",
+    ),
+    MalformedSequence(
+        "empty cell in another IMU",
+        "imu_r23.csv",
+        set_text(
+            "imu_r23.csv", "t_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n0,0,,0,0,0,0\n"
+        ),
+        "[rad/s], got ''",
+        line=2,
+        field="gyro_y",
+    ),
+    MalformedSequence(
+        "empty coordinate of an endcap",
+        "endcaps.csv",
+        set_cell("endcaps.csv", 4, 1, ""),
+        "[m], got ''",
+        line=4,
+        field="q_0_x",
+    ),
+    MalformedSequence(
+        "short row of empty cells",
+        "cables.csv",
+        set_line("cables.csv", 5, lambda line: line.split(",")[0] + 8 * ","),
+        "9 columns, expected 10",
+        line=5,
+    ),
+    MalformedSequence(
+        "one empty cell too many",
+        "cables.csv",
+        set_line("cables.csv", 5, lambda line: line + ","),
+        "11 columns, expected 10",
+        line=5,
+    ),
+    MalformedSequence(
+        "NaN for a cable without measurement",
+        "cables.csv",
+        set_cell("cables.csv", 5, 3, "nan"),
+        "an empty cell or a length between 0 and 2.9 m (two rod lengths) [m], got nan",
+        line=5,
+        field="l_2_4",
+    ),
+    MalformedSequence(
+        "text for a cable without measurement",
+        "cables.csv",
+        set_line("cables.csv", 5, lambda line: line.split(",")[0] + ",,lost" + 7 * ","),
+        "an empty cell or a length between 0 and 2.9 m (two rod lengths) [m], got 'lost'",
+        line=5,
+        field="l_0_2",
+    ),
+    MalformedSequence(
+        "infinite length",
+        "cables.csv",
+        set_cell("cables.csv", 5, 3, "inf"),
+        "(two rod lengths) [m], got inf",
+        line=5,
+        field="l_2_4",
     ),
     MalformedSequence(
         "decimal comma",

@@ -64,6 +64,30 @@ def test_what_is_optional_may_be_missing(tmp_path: Path) -> None:
     assert again.robot == robots.load("prism3")
 
 
+def test_an_empty_cell_is_a_cable_without_measurement(sequence_path: Path, tmp_path: Path) -> None:
+    file = sequence_path / "cables.csv"
+    before = read(sequence_path).cables.lengths
+    header, *rows = (line.split(",") for line in file.read_text().splitlines())
+    rows[0][1] = rows[3][5] = ""
+    rows[3][9] = " "
+    rows[7][1:] = [""] * 9
+    lines = [",".join(row) for row in (header, *rows)]
+    lines.insert(3, "")  # a blank line must not shift what is missing
+    file.write_text("\r\n".join(lines) + "\r\n")
+
+    sequence = read(sequence_path)
+    missing = np.zeros(before.shape, dtype=bool)
+    missing[0, 0] = missing[3, 4] = missing[3, 8] = missing[7] = True
+    np.testing.assert_array_equal(np.isnan(sequence.cables.lengths), missing)
+    np.testing.assert_array_equal(sequence.cables.lengths[~missing], before[~missing])
+
+    write(sequence, tmp_path / "again")
+    assert_same(read(tmp_path / "again"), sequence)
+    written = (tmp_path / "again" / "cables.csv").read_text().splitlines()
+    assert written[1].split(",")[1] == ""
+    assert written[8].endswith("0" + 9 * ",")
+
+
 def test_files_the_format_does_not_know_are_ignored(sequence_path: Path) -> None:
     before = read(sequence_path)
     (sequence_path / "notes.csv").write_bytes(b"\xff\x00")
@@ -144,10 +168,13 @@ ZERO, ONE = np.zeros((3, 3)), np.ones((3, 3))
         (still(imu=ImuStream(T[:2], ZERO, ONE)), "imu.csv: 2 stamps and 6 columns"),
         (still(imu=ImuStream(T[:0], ZERO[:0], ONE[:0])), "imu.csv: no samples"),
         (still(cables=CableStream(T, np.ones((3, 8)))), "cables.csv: 3 stamps and 9 columns"),
-        (still(cables=CableStream(T, -np.ones((3, 9)))), "column 'l_0_4': expected a length"),
+        (still(cables=CableStream(T, -np.ones((3, 9)))), "column 'l_0_4': expected an empty cell"),
+        (still(cables=CableStream(T, np.full((3, 9), np.inf))), "column 'l_0_4': expected an"),
+        (still(cables=CableStream(T, np.full((3, 9), np.nan))), "all values are missing"),
         (still(contacts=ContactStream(T, np.ones((3, 5), bool))), "contacts.csv"),
         (still(groundtruth=PoseStream(T, ZERO, np.ones((3, 4)))), "not of unit length"),
         (still(endcaps=EndcapStream(T, np.full((3, 6, 3), np.inf))), "endcaps.csv"),
+        (still(endcaps=EndcapStream(T, np.full((3, 6, 3), np.nan))), "endcaps.csv: row 0"),
         (still(other_imus={"r23": ImuStream(T, ZERO, ONE * np.inf)}), "imu_r23.csv"),
     ],
 )
@@ -174,16 +201,22 @@ def sequences(draw: st.DrawFn) -> Sequence:
     quaternion = draw(arrays((count, 4), -1, 1))
     quaternion[:, 3] += 3.0  # away from zero
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    rates, forces = arrays((count, 3), -1e9, 1e9), arrays((count, 3), -1e3, 1e3)
+    lengths = draw(arrays((count, 9), 1e-6, 2.9))
+    lost = draw(npst.arrays(np.bool_, (count, 9)))
+    lengths[lost & ~lost.all()] = np.nan  # a recording with no length at all cannot be written
     return Sequence(
         name="random",
         robot=robots.load(),
-        imu=ImuStream(
-            t_ns, draw(arrays((count, 3), -1e9, 1e9)), draw(arrays((count, 3), -1e3, 1e3))
-        ),
-        cables=CableStream(t_ns, draw(arrays((count, 9), 1e-6, 2.9))),
+        imu=ImuStream(t_ns, draw(rates), draw(forces)),
+        cables=CableStream(t_ns, lengths),
         contacts=ContactStream(t_ns, draw(npst.arrays(np.bool_, (count, 6)))),
         groundtruth=PoseStream(t_ns, draw(arrays((count, 3), -1e6, 1e6)), quaternion),
         endcaps=EndcapStream(t_ns, draw(arrays((count, 6, 3), -1e300, 1e300))),
+        other_imus={
+            name: ImuStream(t_ns, draw(rates), draw(forces))
+            for name in sorted(draw(st.sets(st.sampled_from(["r23", "r45", "tip_0"]))))
+        },
     )
 
 

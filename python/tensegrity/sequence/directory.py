@@ -88,7 +88,7 @@ def write(sequence: Sequence, path: str | Path, *, overwrite: bool = False) -> N
         for name, imu in sequence.other_imus.items():
             _write_imu(folder / f"imu_{name}.csv", imu)
         cables = sequence.cables
-        write_csv(folder / CABLES, _cable_columns(robot), cables.t_ns, cables.lengths)
+        write_csv(folder / CABLES, cable_columns(robot), cables.t_ns, cables.lengths)
         if sequence.contacts is not None:
             contacts = sequence.contacts
             write_csv(folder / CONTACTS, contact_columns(robot), contacts.t_ns, contacts.flags)
@@ -111,6 +111,20 @@ def write_endcaps(file: Path, endcaps: EndcapStream) -> None:
     write_csv(file, _endcap_columns(count), endcaps.t_ns, values)
 
 
+def cable_columns(robot: Robot) -> list[Column]:
+    """One length per cable; an empty cell says that the cable was not measured."""
+    longest = _LONGEST_CABLE * robot.rod_length
+    return [
+        Column(
+            "l_{}_{}".format(*cable.endcaps),
+            f"an empty cell or a length between 0 and {longest:g} m (two rod lengths) [m]",
+            lambda lengths: (lengths > 0) & (lengths <= longest),
+            may_be_empty=True,
+        )
+        for cable in robot.cables
+    ]
+
+
 def contact_columns(robot: Robot) -> list[Column]:
     """One 0/1 column per endcap."""
     return [
@@ -123,18 +137,6 @@ def _endcap_columns(count: int) -> list[Column]:
     return [Column(f"q_{i}_{axis}", "a finite number [m]") for i in range(count) for axis in "xyz"]
 
 
-def _cable_columns(robot: Robot) -> list[Column]:
-    longest = _LONGEST_CABLE * robot.rod_length
-    return [
-        Column(
-            "l_{}_{}".format(*cable.endcaps),
-            f"a length between 0 and {longest:g} m (two rod lengths) [m]",
-            lambda lengths: (lengths > 0) & (lengths <= longest),
-        )
-        for cable in robot.cables
-    ]
-
-
 def _read_imu(file: Path) -> ImuStream:
     table = read_csv(file, _IMU_COLUMNS)
     return ImuStream(table.t_ns, table.values[:, :3].copy(), table.values[:, 3:].copy())
@@ -145,7 +147,7 @@ def _write_imu(file: Path, imu: ImuStream) -> None:
 
 
 def _read_cables(file: Path, robot: Robot) -> CableStream:
-    table = read_csv(file, _cable_columns(robot))
+    table = read_csv(file, cable_columns(robot))
     return CableStream(table.t_ns, table.values)
 
 

@@ -32,7 +32,7 @@ class ImuStream:
 @dataclass(frozen=True)
 class CableStream:
     """Cable lengths: ``t_ns`` (N,) stamps [ns]; ``lengths`` (N, cables) distances of endcap
-    centres [m], columns in the order of ``robot.cables``."""
+    centres [m], columns in the order of ``robot.cables``, NaN where a cable was not measured."""
 
     t_ns: IntArray
     lengths: FloatArray

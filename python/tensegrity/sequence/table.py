@@ -7,6 +7,7 @@ Reading is fast for files that are right (one vectorised pass) and exact about t
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -25,16 +26,21 @@ BoolArray = NDArray[np.bool_]
 Values = FloatArray | BoolArray
 
 _INT64 = np.iinfo(np.int64)
+_EMPTY_CELL = re.compile(r",\s*(?:,|$)")
 
 
 @dataclass(frozen=True)
 class Column:
     """A column after the stamp: its name, what it holds (in words, with the unit), and a
-    vectorised test of its values, which are finite before the test sees them."""
+    vectorised test of its values, which are finite before the test sees them.
+
+    ``may_be_empty``: an empty cell of a CSV file is no error but NaN, and NaN is written as an
+    empty cell. The text ``nan`` is an error everywhere."""
 
     name: str
     expected: str
     accepts: Callable[[FloatArray], BoolArray] | None = None
+    may_be_empty: bool = False
 
 
 @dataclass(frozen=True)
@@ -135,6 +141,7 @@ def _read(file: Path, columns: Sequence[Column], dialect: _Dialect) -> Table:
             hint="the file was cut off; if this line is complete, add a line end",
         )
     lines = np.arange(first, text.count("\n") + 1)
+    text, empty_cells = _fill_empty_cells(text, first, columns)
     row_type = [("stamp", "U40"), ("values", np.float64, (len(columns),))]
     try:
         with warnings.catch_warnings():
@@ -156,11 +163,44 @@ def _read(file: Path, columns: Sequence[Column], dialect: _Dialect) -> Table:
     if len(rows) < len(lines):
         lines = _row_lines(text, first, dialect)
     table = Table(file, t_ns, rows["values"], lines)
-    problem = _first_problem(table.t_ns, table.values, columns, dialect)
+    missing = np.zeros(table.values.shape, dtype=np.bool_)
+    for line, column in empty_cells:
+        missing[np.searchsorted(lines, line), column] = True
+    problem = _first_problem(table.t_ns, table.values, missing, columns, dialect)
     if problem is not None:
         row, name, what = problem
         raise InputError(what, file=file, line=int(lines[row]), field=name)
+    if missing.all():
+        raise InputError(
+            f"every cell but those of '{dialect.stamp_name}' is empty",
+            file=file,
+            hint=f"expected {columns[0].expected} in at least one of them",
+        )
     return table
+
+
+def _fill_empty_cells(
+    text: str, first: int, columns: Sequence[Column]
+) -> tuple[str, list[tuple[int, int]]]:
+    """``text`` with NaN in the empty cells that are allowed, and their lines and columns.
+
+    Columns are counted as in ``columns``, lines from 1 with ``first`` the first below the header.
+    """
+    allowed = [index for index, column in enumerate(columns) if column.may_be_empty]
+    filled: list[tuple[int, int]] = []
+    if not allowed:
+        return text, filled
+    content = text.split("\n")
+    for number, line in enumerate(content[first - 1 :], start=first):
+        if _EMPTY_CELL.search(line) is None:
+            continue
+        stamp, *cells = line.split(",")
+        for index in allowed:
+            if index < len(cells) and not cells[index].strip():
+                cells[index] = "nan"
+                filled.append((number, index))
+        content[number - 1] = ",".join([stamp, *cells])
+    return "\n".join(content), filled
 
 
 def _row_lines(text: str, first: int, dialect: _Dialect) -> IntArray:
@@ -204,9 +244,14 @@ def _check_header(file: Path, names: list[str], expected: list[str]) -> None:
 
 
 def _first_problem(
-    t_ns: IntArray, values: FloatArray, columns: Sequence[Column], dialect: _Dialect
+    t_ns: IntArray,
+    values: FloatArray,
+    missing: BoolArray,
+    columns: Sequence[Column],
+    dialect: _Dialect,
 ) -> tuple[int, str, str] | None:
-    """Row, column and problem of the first value that is not what it should be."""
+    """Row, column and problem of the first value that is not what it should be; ``missing`` has
+    the shape of ``values`` and is true where there need not be any."""
     problems: list[tuple[int, str, str]] = []
     backward = np.flatnonzero(np.diff(t_ns) <= 0)
     if len(backward):
@@ -221,7 +266,7 @@ def _first_problem(
         good = finite[:, index]
         if column.accepts is not None:
             good = good & column.accepts(np.where(good, values[:, index], 0.0))
-        bad = np.flatnonzero(~good)
+        bad = np.flatnonzero(~good & ~missing[:, index])
         if len(bad):
             row = int(bad[0])
             value = f"{values[row, index]:.9g}"
@@ -277,10 +322,13 @@ def _write(
         )
     if not len(t_ns):
         raise ValueError(f"{file.name}: no samples")
-    problem = _first_problem(t_ns, numbers, columns, dialect)
+    missing = np.isnan(numbers) & [column.may_be_empty for column in columns]
+    problem = _first_problem(t_ns, numbers, missing, columns, dialect)
     if problem is not None:
         row, name, what = problem
         raise ValueError(f"{file.name}: row {row}, column '{name}': {what}")
+    if missing.all():
+        raise ValueError(f"{file.name}: all values are missing")
     separator = dialect.separator or " "
     names = [dialect.stamp_name, *(column.name for column in columns)]
     header = separator.join(names) + "\n" if dialect.has_header else ""
@@ -289,4 +337,6 @@ def _write(
         row_format % (dialect.format_stamp(stamp), *row)
         for stamp, row in zip(t_ns.tolist(), numbers.tolist(), strict=True)
     )
+    if missing.any():
+        body = body.replace("nan", "")  # every other NaN was refused above
     file.write_text(header + body, encoding="utf-8", newline="\n")
