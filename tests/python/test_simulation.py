@@ -245,6 +245,21 @@ def test_cable_offsets_are_added(exact: Sequence) -> None:
     np.testing.assert_allclose(difference, np.tile(offsets, (len(difference), 1)), atol=1e-12)
 
 
+def test_drawn_cable_offsets_have_the_size_of_the_option(exact: Sequence) -> None:
+    offsets = []
+    for seed in (0, 1):
+        options = {"randomize": False, "path_length": 0.1, "seed": seed}
+        plain = short(**NOISELESS, **options).cables.lengths
+        shifted = short(**NOISELESS, **options, cable_offset_std=0.005).cables.lengths
+        offsets.append((shifted - plain)[0])
+        np.testing.assert_allclose(
+            shifted - plain, np.tile(offsets[-1], (len(plain), 1)), atol=1e-12
+        )
+    assert not np.allclose(offsets[0], offsets[1])
+    # Of 18 normal values: 99.98 % of all seeds lie between (chi-square distribution).
+    assert 0.46 < np.sqrt(np.mean(np.square(offsets))) / 0.005 < 1.64
+
+
 def test_contacts_lie_on_the_ground(exact: Sequence) -> None:
     heights, flags = endcaps_of(exact)[:, :, 2], flags_of(exact)
     radius = exact.robot.endcap_radius
@@ -260,6 +275,46 @@ def test_wrong_contact_flags_come_at_their_rates(exact: Sequence) -> None:
     truth = flags_of(exact)
     assert wrong[~truth].mean() == pytest.approx(0.1, abs=0.02)
     assert (~wrong[truth]).mean() == pytest.approx(0.3, abs=0.03)
+
+
+# --- sensors that fall silent -------------------------------------------------------------------
+
+
+def test_imu_gaps_lack_whole_samples_of_the_base_imu_alone(noisy: Sequence) -> None:
+    gappy = short(rod_imus=True, imu_gap=0.05, imu_gap_period=1.5)
+    # The motion begins after 1 s: gaps from 2.5 s, 4 s, ... on, each of ten samples of 5 ms.
+    last = noisy.imu.t_ns[-1] * 1e-9
+    starts = np.arange(2.5, last, 1.5)
+    assert len(starts) > 2
+    in_gap = np.zeros(len(noisy.imu.t_ns), dtype=bool)
+    for first in np.round(starts / 0.005).astype(int):
+        in_gap[first : first + 10] = True
+    np.testing.assert_array_equal(gappy.imu.t_ns, noisy.imu.t_ns[~in_gap])
+    np.testing.assert_array_equal(gappy.imu.gyro, noisy.imu.gyro[~in_gap])
+    np.testing.assert_array_equal(gappy.imu.accel, noisy.imu.accel[~in_gap])
+    for one, other in zip(arrays(gappy)[2:], arrays(noisy)[2:], strict=True):
+        np.testing.assert_array_equal(one, other)
+    for name, imu in noisy.other_imus.items():
+        np.testing.assert_array_equal(gappy.other_imus[name].gyro, imu.gyro)
+
+
+@pytest.mark.parametrize(
+    ("failure", "first", "last"),
+    [
+        ({"lost_cable_from": 0.5}, 1.5, np.inf),
+        ({"lost_cable_from": 0.5, "lost_cable_duration": 0.75}, 1.5, 2.25),
+        ({"lost_cable_from": -1.0}, 0.0, np.inf),
+    ],
+)
+def test_a_lost_cable_has_no_lengths_while_it_is_lost(
+    failure: dict[str, float], first: float, last: float, noisy: Sequence
+) -> None:
+    sequence = short(rod_imus=True, lost_cable="l_1_3", **failure)
+    seconds = noisy.cables.t_ns * 1e-9
+    expected = noisy.cables.lengths.copy()
+    expected[(seconds > first - 1e-6) & (seconds < last - 1e-6), 4] = np.nan
+    np.testing.assert_array_equal(sequence.cables.lengths, expected)
+    np.testing.assert_array_equal(sequence.imu.accel, noisy.imu.accel)
 
 
 # --- robots and worlds --------------------------------------------------------------------------
@@ -342,6 +397,9 @@ def test_faster_cables_roll_faster(exact: Sequence) -> None:
         ({"seed": -1}, "seed", "greater than or equal to 0"),
         ({"gyro_noise": float("nan")}, "gyro_noise", r"finite number \[rad/s\]"),
         ({"imu_sampling": "mean"}, "imu_sampling", "interval_mean"),
+        ({"imu_gap": 0.0}, "imu_gap", r"greater than 0 \[s\], got 0"),
+        ({"imu_gap": 10.0}, "imu_gap", "gaps of 10 s every 10 s leave no samples"),
+        ({"lost_cable_duration": -1.0}, "lost_cable_duration", r"greater than 0 \[s\]"),
         ({"frition": 1.0}, "frition", "did you mean 'friction'"),
     ],
 )
@@ -354,6 +412,11 @@ def test_options_reject_what_cannot_be(values: dict[str, Any], field: str, probl
 def test_cable_offsets_are_one_per_cable() -> None:
     with pytest.raises(InputError, match="expected 9 offsets"):
         short(cable_offsets=(0.1, 0.2))
+
+
+def test_the_lost_cable_is_one_of_the_robot() -> None:
+    with pytest.raises(InputError, match=r"no cable is called 'l_4_0' \(cables: l_0_4, l_0_2"):
+        short(lost_cable="l_4_0")
 
 
 def test_unknown_manoeuvre_is_named() -> None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from tensegrity.errors import InputError, did_you_mean
-from tensegrity.yaml_model import StrictModel, field, unit_of
+from tensegrity.yaml_model import StrictModel, field, inconsistent, unit_of
+from tensegrity.yaml_model.model import INCONSISTENT
 
 ImuSampling = Literal["interval_mean", "instantaneous"]
 
@@ -75,12 +76,53 @@ class SimulationOptions(StrictModel):
     cable_offsets: Annotated[tuple[float, ...], Field(strict=False)] | None = field(
         "constant errors, one per cable; none: no errors", unit="m", default=None
     )
+    cable_offset_std: float = field(
+        "standard deviation of further constant errors, drawn from the seed",
+        unit="m",
+        default=0.0,
+        ge=0,
+    )
     contact_false_rate: float = field(
         "share of samples in the air reported", default=0.0, ge=0, le=1
     )
     contact_missing_rate: float = field(
         "share of samples on the ground reported as free", default=0.0, ge=0, le=1
     )
+
+    imu_gap: float | None = field(
+        "length of the gaps in which the base IMU delivers no samples; none: no gaps",
+        unit="s",
+        default=None,
+        gt=0,
+    )
+    imu_gap_period: float = field(
+        "from the start of the motion to the first gap and from gap to gap",
+        unit="s",
+        default=10.0,
+        gt=0,
+    )
+    lost_cable: str | None = field(
+        "cable that is not measured, by its column in cables.csv (l_0_4); none: all are measured",
+        default=None,
+    )
+    lost_cable_from: float = field(
+        "when it is lost, from the start of the motion; negative: still standing",
+        unit="s",
+        default=0.0,
+    )
+    lost_cable_duration: float | None = field(
+        "how long it is lost; none: for good", unit="s", default=None, gt=0
+    )
+
+    @model_validator(mode="after")
+    def _gaps_have_samples_between_them(self) -> SimulationOptions:
+        if self.imu_gap is not None and self.imu_gap >= self.imu_gap_period:
+            raise inconsistent(
+                f"gaps of {self.imu_gap:g} s every {self.imu_gap_period:g} s leave no samples",
+                "imu_gap",
+                "imu_gap_period",
+            )
+        return self
 
     def __init__(self, **values: Any) -> None:
         try:
@@ -92,6 +134,9 @@ class SimulationOptions(StrictModel):
 def _input_error(error: ValidationError) -> InputError:
     """The first problem, in the words of the field."""
     detail = error.errors()[0]
+    if detail["type"] == INCONSISTENT:
+        first, *others = detail["ctx"]["fields"]
+        return InputError(detail["msg"], field=first, hint=f"change it or {', '.join(others)}")
     name = str(detail["loc"][0])
     info = SimulationOptions.model_fields.get(name)
     if info is None:

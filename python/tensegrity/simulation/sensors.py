@@ -110,6 +110,7 @@ def cable_stream(
     if options.cable_offsets is not None:
         lengths += np.array(options.cable_offsets)
     lengths += rng.normal(0.0, options.cable_noise, lengths.shape)
+    lengths += rng.normal(0.0, options.cable_offset_std, len(robot.cables))
     return CableStream(t_ns=stamps(len(lengths), CABLE_PERIOD_S), lengths=lengths)
 
 

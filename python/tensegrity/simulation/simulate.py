@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from tensegrity.errors import InputError
 from tensegrity.robots import Robot, load
 from tensegrity.sequence.sequence import EndcapStream, PoseStream, Sequence
+from tensegrity.simulation.failures import lost_cable_index, with_gaps, without_lost_cable
 from tensegrity.simulation.gait import FACES, Gait
 from tensegrity.simulation.manoeuvres import Manoeuvre
 from tensegrity.simulation.options import SimulationOptions
@@ -68,6 +69,7 @@ def simulate(
     manoeuvre = Manoeuvre.named(manoeuvre)
     options = SimulationOptions() if options is None else options
     robot = _variant(load() if robot is None else robot, options)
+    _check_cables(robot, options)
     motion_rng, *sensor_rngs = (
         np.random.default_rng(seed) for seed in np.random.SeedSequence(options.seed).spawn(4)
     )
@@ -92,12 +94,6 @@ def simulate(
 
 def _variant(robot: Robot, options: SimulationOptions) -> Robot:
     """``robot`` with what the options change."""
-    if options.cable_offsets is not None and len(options.cable_offsets) != len(robot.cables):
-        raise InputError(
-            f"expected {len(robot.cables)} offsets [m], got {len(options.cable_offsets)}",
-            field="cable_offsets",
-            hint="one per cable, in the robot's order",
-        )
     changes: dict[str, object] = {}
     if options.mirrored:
         mirror_images = {"counter_clockwise": "clockwise", "clockwise": "counter_clockwise"}
@@ -107,6 +103,18 @@ def _variant(robot: Robot, options: SimulationOptions) -> Robot:
     if options.cable_attachment_offset is not None:
         changes["cable_attachment_offset"] = options.cable_attachment_offset
     return robot.model_copy(update=changes)
+
+
+def _check_cables(robot: Robot, options: SimulationOptions) -> None:
+    """Whether what the options say about cables fits the robot's, before anything is simulated."""
+    if options.cable_offsets is not None and len(options.cable_offsets) != len(robot.cables):
+        raise InputError(
+            f"expected {len(robot.cables)} offsets [m], got {len(options.cable_offsets)}",
+            field="cable_offsets",
+            hint="one per cable, in the robot's order",
+        )
+    if options.lost_cable is not None:
+        lost_cable_index(options.lost_cable, robot)
 
 
 def _draw(options: SimulationOptions, rng: np.random.Generator) -> _Draw:
@@ -228,8 +236,8 @@ def _recording(
     return Sequence(
         name=name,
         robot=robot,
-        imu=base,
-        cables=cable_stream(endcaps, robot, options, cable_rng),
+        imu=with_gaps(base, options),
+        cables=without_lost_cable(cable_stream(endcaps, robot, options, cable_rng), robot, options),
         contacts=contact_stream(log.normal_forces()[since_start], options, contact_rng),
         groundtruth=PoseStream(
             t_ns=t_ns,
