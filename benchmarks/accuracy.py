@@ -3,10 +3,13 @@
     python benchmarks/accuracy.py                              # what the README shows
     python benchmarks/accuracy.py --methods full mine.yaml --seeds 10-19 --manoeuvres forward
     python benchmarks/accuracy.py --ablation
+    python benchmarks/accuracy.py --variants                   # other ground, robot, sensors
+    python benchmarks/accuracy.py --variants nominal imu-gaps --seeds 0 --manoeuvres forward
     python benchmarks/accuracy.py recordings/monday recordings/tuesday
 
 Prints a table and writes it to OUT/accuracy.md, and every single run's metrics to
-OUT/accuracy.json. Simulated recordings stay in OUT/recordings and are used again.
+OUT/accuracy.json (with --variants: variants.md and variants.json). Simulated recordings stay in
+OUT/recordings and are used again.
 """
 
 from __future__ import annotations
@@ -17,20 +20,22 @@ import json
 import multiprocessing
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import fmean
 from typing import Any
+
+from accuracy_table import Result, table
+from accuracy_variants import NOMINAL, VARIANTS, Variant
 
 import tensegrity
 from tensegrity import robots
 from tensegrity.cli.recording import SIMULATION, describe, record
 from tensegrity.config import FilterConfig
 from tensegrity.errors import InputError
-from tensegrity.evaluation import Metrics, evaluate, published_result
-from tensegrity.simulation import Manoeuvre, SimulationOptions
+from tensegrity.evaluation import evaluate
+from tensegrity.simulation import Manoeuvre
 
 Methods = dict[str, FilterConfig]
 """Configurations by the label they have in the table."""
@@ -44,53 +49,47 @@ _SWITCHES: dict[str, tuple[tuple[str, str], ...]] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Recording:
     """A directory on disk; ``group`` is what its results are averaged with."""
 
     group: str
     path: Path
+    variant: Variant = NOMINAL
+
+    def make(self) -> None:
+        """Nothing to do: a recording of the user's."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Simulated(Recording):
     """A recording that is made when it is not there yet."""
 
+    manoeuvre: Manoeuvre
     seed: int
 
     def make(self) -> None:
         """Simulate, unless the same simulation is already on disk."""
-        manoeuvre, robot = Manoeuvre.named(self.group), robots.load()
-        options = SimulationOptions(seed=self.seed)
+        robot, options = robots.load(), self.variant.simulation(self.seed)
         made = self.path / SIMULATION
         if made.is_file() and made.read_text(encoding="utf-8") == describe(
-            manoeuvre, options, robot
+            self.manoeuvre, options, robot
         ):
             return
-        record(manoeuvre, options, robot, self.path, progress=lambda fraction: None)
-
-
-@dataclass(frozen=True)
-class Result:
-    """One recording by one method."""
-
-    group: str
-    method: str
-    recording: str
-    metrics: Metrics
+        record(self.manoeuvre, options, robot, self.path, progress=lambda fraction: None)
 
 
 def run(recording: Recording, methods: Methods) -> list[Result]:
     """Estimate and evaluate one recording by every method."""
-    if isinstance(recording, Simulated):
-        recording.make()
-    sequence = tensegrity.sequence.read(recording.path)
+    recording.make()
+    variant = recording.variant
+    sequence = variant.sensed(tensegrity.sequence.read(recording.path))
     return [
         Result(
             recording.group,
             label,
             recording.path.name,
-            evaluate(tensegrity.estimate(sequence, config=config), sequence),
+            evaluate(tensegrity.estimate(sequence, config=variant.declared(config)), sequence),
         )
         for label, config in methods.items()
     ]
@@ -103,9 +102,9 @@ def run_all(recordings: Sequence[Recording], methods: Methods, jobs: int) -> lis
         futures = {executor.submit(run, one, methods): one for one in recordings}
         try:
             for done, future in enumerate(as_completed(futures), start=1):
+                # The name first: when this recording fails, it is the last one named.
+                print(f"{done}/{len(futures)} {futures[future].path.name}", file=sys.stderr)
                 future.result()
-                name = futures[future].path.name
-                print(f"{done}/{len(futures)} {name}", file=sys.stderr)
         except BaseException:
             executor.shutdown(cancel_futures=True)
             raise
@@ -138,101 +137,6 @@ def _switched(config: FilterConfig, other: FilterConfig, setting: str) -> Filter
     return FilterConfig.model_validate(values)
 
 
-# --- tables -------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Summary:
-    """What the table shows of several runs; ``None`` where no recording allows the figure."""
-
-    runs: int
-    drift_percent_mean: float | None
-    drift_percent_worst: float | None
-    rpe_trans_m_per_m: float | None
-    rpe_rot_deg_per_m: float | None
-    z_drift_m: float | None
-    endcap_rmse_m: float | None
-    nees_position_median: float | None
-
-
-def summary(runs: Sequence[Metrics]) -> Summary:
-    """Means over ``runs`` and the worst drift; the vertical drift counts without its sign."""
-
-    def values(name: str) -> list[float]:
-        return [abs(x) for x in (getattr(m, name) for m in runs) if x is not None]
-
-    def mean(name: str) -> float | None:
-        return fmean(values(name)) if values(name) else None
-
-    return Summary(
-        runs=len(runs),
-        drift_percent_mean=mean("final_drift_percent"),
-        drift_percent_worst=max(values("final_drift_percent"), default=None),
-        rpe_trans_m_per_m=mean("rpe_trans_rmse_m_per_m"),
-        rpe_rot_deg_per_m=mean("rpe_rot_rmse_deg_per_m"),
-        z_drift_m=mean("z_drift_m"),
-        endcap_rmse_m=mean("endcap_rmse_m"),
-        nees_position_median=mean("nees_position_median"),
-    )
-
-
-# Header, field of Summary, format, and what a metre becomes.
-_COLUMNS = (
-    ("drift, mean [%]", "drift_percent_mean", ".1f", 1),
-    ("worst [%]", "drift_percent_worst", ".1f", 1),
-    ("RPE [m/m]", "rpe_trans_m_per_m", ".3f", 1),
-    ("RPE [°/m]", "rpe_rot_deg_per_m", ".2f", 1),
-    ("z drift [cm]", "z_drift_m", ".1f", 100),
-    ("endcaps [mm]", "endcap_rmse_m", ".0f", 1000),
-    ("NEES", "nees_position_median", ".1f", 1),
-)
-
-
-def table(results: Sequence[Result]) -> str:
-    """Markdown: a row per group and method, and one per method over all groups."""
-    groups = list(dict.fromkeys(result.group for result in results))
-    methods = list(dict.fromkeys(result.method for result in results))
-    lines = [
-        "| | method | runs | " + " | ".join(header for header, *_ in _COLUMNS) + " |",
-        "|---|---|--:|" + "--:|" * len(_COLUMNS),
-    ]
-    for group in groups:
-        for method in methods:
-            of = [r.metrics for r in results if (r.group, r.method) == (group, method)]
-            lines.append(_row(group, method, summary(of)))
-        lines.extend(_published_row(group))
-    if len(groups) > 1:
-        for method in methods:
-            of = [r.metrics for r in results if r.method == method]
-            lines.append(_row("**all**", method, summary(of)))
-    return "\n".join(lines) + "\n"
-
-
-def _row(group: str, method: str, figures: Summary) -> str:
-    cells = [group, method, str(figures.runs)]
-    for _, name, form, scale in _COLUMNS:
-        value = getattr(figures, name)
-        cells.append("–" if value is None else format(scale * value, form))
-    return "| " + " | ".join(cells) + " |"
-
-
-def _published_row(group: str) -> Iterable[str]:
-    found = published_result(group)
-    if found is not None:
-        figures = found[1]
-        published = Summary(
-            runs=1,
-            drift_percent_mean=figures.final_drift_percent,
-            drift_percent_worst=None,
-            rpe_trans_m_per_m=figures.rpe_trans_rmse_m_per_m,
-            rpe_rot_deg_per_m=figures.rpe_rot_rmse_deg_per_m,
-            z_drift_m=None,
-            endcap_rmse_m=None,
-            nees_position_median=None,
-        )
-        yield _row(group, "T, Table II", published)
-
-
 # --- command line -------------------------------------------------------------------------------
 
 
@@ -251,7 +155,20 @@ def arguments() -> argparse.Namespace:
     )
     parser.add_argument("recordings", nargs="*", type=Path, help="instead of simulations")
     parser.add_argument("--seeds", type=seeds, default=seeds("0-4"), help="such as 0-4,7")
-    parser.add_argument("--manoeuvres", nargs="+", choices=list(Manoeuvre), default=list(Manoeuvre))
+    parser.add_argument(
+        "--manoeuvres",
+        nargs="+",
+        type=Manoeuvre,
+        choices=list(Manoeuvre),
+        help="all; with --variants forward and left-turn",
+    )
+    parser.add_argument(
+        "--variants",
+        nargs="*",
+        metavar="NAME",
+        choices=list(VARIANTS),
+        help=f"group by variant instead of manoeuvre; all, or some of {', '.join(VARIANTS)}",
+    )
     parser.add_argument(
         "--methods", nargs="+", default=["paper", "full"], help="packaged profiles or YAML files"
     )
@@ -262,7 +179,35 @@ def arguments() -> argparse.Namespace:
     )
     parser.add_argument("--out", type=Path, default=Path("runs/accuracy"))
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
-    return parser.parse_args()
+    args = parser.parse_args()
+    if args.recordings and args.variants is not None:
+        parser.error("--variants are simulated, not read from recordings")
+    return args
+
+
+def simulations(args: argparse.Namespace) -> list[Recording]:
+    """All seeds of each manoeuvre, or of each variant."""
+    folder = args.out / "recordings"
+    if args.variants is None:
+        return [
+            Simulated(
+                group=manoeuvre, path=folder / f"{manoeuvre}-{seed}", manoeuvre=manoeuvre, seed=seed
+            )
+            for manoeuvre in args.manoeuvres or Manoeuvre
+            for seed in args.seeds
+        ]
+    return [
+        Simulated(
+            group=name,
+            path=folder / f"{manoeuvre}-{seed}-{name}",
+            variant=VARIANTS[name],
+            manoeuvre=manoeuvre,
+            seed=seed,
+        )
+        for name in args.variants or VARIANTS
+        for manoeuvre in args.manoeuvres or (Manoeuvre.FORWARD, Manoeuvre.LEFT_TURN)
+        for seed in args.seeds
+    ]
 
 
 def main() -> None:
@@ -271,23 +216,18 @@ def main() -> None:
         methods = ablation()
     else:
         methods = {name: FilterConfig.load(name) for name in args.methods}
-    recordings: list[Recording] = [Recording(path.resolve().name, path) for path in args.recordings]
-    if not recordings:
-        recordings = [
-            Simulated(manoeuvre, args.out / "recordings" / f"{manoeuvre}-{seed}", seed)
-            for manoeuvre in args.manoeuvres
-            for seed in args.seeds
-        ]
-    results = run_all(recordings, methods, args.jobs)
+    recordings = [Recording(group=path.resolve().name, path=path) for path in args.recordings]
+    results = run_all(recordings or simulations(args), methods, args.jobs)
 
     args.out.mkdir(parents=True, exist_ok=True)
+    name = "accuracy" if args.variants is None else "variants"
     text = table(results)
-    (args.out / "accuracy.md").write_text(text, encoding="utf-8")
+    (args.out / f"{name}.md").write_text(text, encoding="utf-8")
     content = {
         "methods": {label: config.model_dump() for label, config in methods.items()},
         "runs": [dataclasses.asdict(result) for result in results],
     }
-    (args.out / "accuracy.json").write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    (args.out / f"{name}.json").write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
     print(text)
 
 
