@@ -257,7 +257,7 @@ def test_drawn_cable_offsets_have_the_size_of_the_option(exact: Sequence) -> Non
         )
     assert not np.allclose(offsets[0], offsets[1])
     # Of 18 normal values: 99.98 % of all seeds lie between (chi-square distribution).
-    assert 0.46 < np.sqrt(np.mean(np.square(offsets))) / 0.005 < 1.64
+    assert 0.44 < np.sqrt(np.mean(np.square(offsets))) / 0.005 < 1.65
 
 
 def test_contacts_lie_on_the_ground(exact: Sequence) -> None:
