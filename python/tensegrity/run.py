@@ -31,6 +31,7 @@ STATE = "state.csv"
 CONFIG = "config.yaml"
 
 _HEALTH = "health_"
+_NIS = ("cable_nis", "ground_nis")
 _UPPER = np.triu_indices(3)
 
 
@@ -102,7 +103,17 @@ def read_run(path: str | Path) -> Run:
     info = document.model(RunInfo, document.mapping())
     poses = read_poses(path / TRAJECTORY)
     endcaps = read_endcaps(path / ENDCAPS, info.robot)
-    names = [n.removeprefix(_HEALTH) for n in csv_header(path / STATE) if n.startswith(_HEALTH)]
+    header = csv_header(path / STATE)
+    for name in _NIS:
+        if name not in header:
+            raise InputError(
+                "column is missing",
+                file=path / STATE,
+                line=1,
+                field=name,
+                hint="runs of versions before it had none: estimate again",
+            )
+    names = [n.removeprefix(_HEALTH) for n in header if n.startswith(_HEALTH)]
     state = read_csv(path / STATE, _state_columns(info.robot, names))
     for file, t_ns in ((ENDCAPS, endcaps.t_ns), (STATE, state.t_ns)):
         if not np.array_equal(t_ns, poses.t_ns):
@@ -131,6 +142,10 @@ def _state_columns(robot: Robot, health: list[str]) -> list[Column]:
         *covariance("position", "m^2"),
         *covariance("orientation", "rad^2"),
         *covariance("velocity", "m^2/s^2"),
+        *(
+            Column(name, "an empty cell or a number >= 0", lambda nis: nis >= 0, may_be_empty=True)
+            for name in _NIS
+        ),
         *contact_columns(robot),
         *(
             Column(f"{_HEALTH}{name}", "a count >= 0", lambda counts: counts >= 0)
@@ -153,6 +168,8 @@ def _pack(trajectory: Trajectory) -> FloatArray:
             trajectory.accel_bias,
             trajectory.spin,
             *(covariance[:, *_UPPER] for covariance in covariances),
+            trajectory.cable_nis,
+            trajectory.ground_nis,
             trajectory.contacts,
             *trajectory.health.values(),
         ]
@@ -163,9 +180,9 @@ def _unpack(
     poses: PoseStream, endcaps: EndcapStream, state: FloatArray, health: list[str], info: RunInfo
 ) -> Trajectory:
     count = info.robot.number_of_endcaps
-    sizes = [3, 3, 3, 1, 6, 6, 6, count]
+    sizes = [3, 3, 3, 1, 6, 6, 6, len(_NIS), count]
     parts = np.split(state, np.cumsum(sizes), axis=1)
-    velocity, gyro_bias, accel_bias, spin, *covariances, contacts, counters = parts
+    velocity, gyro_bias, accel_bias, spin, *covariances, nis, contacts, counters = parts
     rotation = Rotation.from_quat(poses.quaternion).as_matrix()
     relative = endcaps.position - poses.position[:, None]
     position_covariance, orientation_covariance, velocity_covariance = map(_symmetric, covariances)
@@ -184,6 +201,8 @@ def _unpack(
         orientation_covariance=orientation_covariance,
         velocity_covariance=velocity_covariance,
         health=_counters(health, counters),
+        cable_nis=nis[:, 0],
+        ground_nis=nis[:, 1],
         runtime_s=info.runtime_s,
         info=dict(info.info),
     )

@@ -27,8 +27,12 @@ class Trajectory:
     * ``contacts`` (N, E) endcaps the filter holds as contacts
     * ``position_covariance`` (N, 3, 3) of the position error in the world [m^2]
     * ``orientation_covariance`` (N, 3, 3) of the rotation error in the world [rad^2]
-    * ``velocity_covariance`` (N, 3, 3) [m^2/s^2]
+    * ``velocity_covariance`` (N, 3, 3) of the velocity error in the world [m^2/s^2]
     * ``health`` counters by name, each (N,), cumulative from the start
+    * ``cable_nis`` (N,) normalised innovation squared z^T S^-1 z / m of the newest update by m
+      cable lengths; ``ground_nis`` (N,) that of the newest update by the heights of m feet above
+      the ground. NaN before the first one; a row that brings no update repeats the one before.
+      All NaN when left out: a loosely coupled filter has no such updates.
     """
 
     t_ns: IntArray
@@ -45,7 +49,15 @@ class Trajectory:
     orientation_covariance: FloatArray
     velocity_covariance: FloatArray
     health: dict[str, IntArray] = field(default_factory=dict)
+    cable_nis: FloatArray = field(default_factory=lambda: np.empty(0))
+    ground_nis: FloatArray = field(default_factory=lambda: np.empty(0))
     runtime_s: float = 0.0
     """Wall-clock time spent in the estimator [s]."""
     info: dict[str, Any] = field(default_factory=dict)
     """Method, sequence name and whatever else describes the run."""
+
+    def __post_init__(self) -> None:
+        for name in ("cable_nis", "ground_nis"):
+            if not len(getattr(self, name)):
+                # The class is frozen for its users; this is still its construction.
+                object.__setattr__(self, name, np.full(len(self.t_ns), np.nan))

@@ -87,10 +87,34 @@ def test_any_trajectory_reads_back(
         orientation_covariance=covariance[1],
         velocity_covariance=covariance[2],
         health={name: np.cumsum(rng.integers(0, 9, n)) for name in names},
+        cable_nis=np.where(rng.random(n) < 0.5, np.nan, rng.chisquare(9, n) / 9),
+        ground_nis=np.where(rng.random(n) < 0.5, np.nan, rng.chisquare(3, n) / 3),
     )
     path = tmp_path_factory.mktemp("run") / "run"
     write_default(trajectory, path)
     assert_same(read_run(path).trajectory, trajectory)
+
+
+def test_a_trajectory_without_innovations_has_empty_cells(
+    trajectory: Trajectory, run_path: Path
+) -> None:
+    for nis in (trajectory.cable_nis, trajectory.ground_nis):
+        assert nis.shape == trajectory.t_ns.shape
+        assert np.isnan(nis).all()
+    header, *rows = (run_path / "state.csv").read_text().splitlines()
+    at = header.split(",").index("cable_nis")
+    assert header.split(",")[at + 1] == "ground_nis"
+    assert {tuple(row.split(",")[at : at + 2]) for row in rows} == {("", "")}
+
+
+def test_a_run_from_before_the_innovations_says_what_to_do(run_path: Path) -> None:
+    file = run_path / "state.csv"
+    rows = [line.split(",") for line in file.read_text().splitlines()]
+    at = rows[0].index("cable_nis")
+    file.write_text("".join(",".join(row[:at] + row[at + 2 :]) + "\n" for row in rows))
+    with pytest.raises(InputError, match="estimate again") as caught:
+        read_run(run_path)
+    assert (caught.value.file, caught.value.line, caught.value.field) == (file, 1, "cable_nis")
 
 
 def test_information_of_any_kind_is_kept_as_a_scalar(
@@ -144,6 +168,13 @@ def test_a_broken_configuration_is_located(run_path: Path) -> None:
         read_run(run_path)
     assert (caught.value.file, caught.value.line) == (file, line)
     assert caught.value.field == "filter.noises.cable_std"
+
+
+def test_a_negative_innovation_is_refused(trajectory: Trajectory, tmp_path: Path) -> None:
+    nis = np.ones(len(trajectory.t_ns))
+    nis[5] = -0.1
+    with pytest.raises(ValueError, match=r"row 5, column 'ground_nis'.*>= 0, got -0\.1"):
+        write_default(replace(trajectory, ground_nis=nis), tmp_path / "run")
 
 
 def test_a_broken_state_is_located(run_path: Path) -> None:
