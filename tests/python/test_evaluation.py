@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 
 from tensegrity import robots
 from tensegrity.errors import InputError
@@ -24,6 +25,7 @@ from tensegrity.evaluation import (
     measure,
     published_result,
 )
+from tensegrity.evaluation.consistency import band
 from tensegrity.sequence.sequence import (
     CableStream,
     EndcapStream,
@@ -263,6 +265,131 @@ def test_nees_of_gaussian_errors_is_that_of_three_degrees_of_freedom() -> None:
     assert measure(confident, 0.0).nees_position_median == pytest.approx(4 * median)
 
 
+def consistent(scale: float, samples: int = 5_000) -> tuple[Trajectory, Sequence]:
+    """An estimate in a world of its own whose errors are drawn from the covariances it states,
+    times ``scale``; every stamp has covariances of its own."""
+    rng = np.random.default_rng(11)
+    t = np.concatenate([np.zeros(STILL), PERIOD_NS * 1e-9 * np.arange(samples)])
+    # Constant acceleration, so that central differences give the velocity without an error.
+    acceleration = np.array([0.02, -0.01, 0.001])
+    position = 0.5 * acceleration * t[:, None] ** 2
+    orientation = Rotation.from_rotvec(np.outer(t, [0.3, -0.1, 0.2]))
+    n = len(t)
+
+    def draw(sigma: float) -> tuple[FloatArray, FloatArray]:
+        axes = Rotation.random(n, random_state=rng).as_matrix()
+        root = axes * rng.uniform(0.2 * sigma, sigma, (n, 1, 3))
+        error = (root @ rng.normal(size=(n, 3, 1)))[..., 0]
+        error[: STILL + 1] = 0.0  # at rest: the alignment finds the other world exactly
+        return error, scale * root @ root.transpose(0, 2, 1)
+
+    (dp, p_cov), (dr, r_cov), (dv, v_cov) = draw(0.05), draw(0.03), draw(0.1)
+    heading = Rotation.from_euler("z", 2.0)
+    m = heading.as_matrix()
+    sequence = recording(position, orientation)
+    exact = estimate_at(
+        sequence,
+        *moved(position + dp, Rotation.from_rotvec(dr) * orientation, heading, [3.0, -1.0, 0.0]),
+    )
+    trajectory = dataclasses.replace(
+        exact,
+        velocity=heading.apply(acceleration * t[:, None] + dv),
+        position_covariance=m @ p_cov @ m.T,
+        orientation_covariance=m @ r_cov @ m.T,
+        velocity_covariance=m @ v_cov @ m.T,
+    )
+    return trajectory, sequence
+
+
+@pytest.mark.parametrize("alignment", list(Alignment))
+@pytest.mark.parametrize("scale", [1.0, 0.25, 4.0])
+def test_nees_tells_honest_covariances_from_scaled_ones(scale: float, alignment: Alignment) -> None:
+    """Tolerances are four standard deviations of the figure over 5000 samples."""
+    n = 5_000
+    metrics = evaluate(*consistent(scale, n), alignment)
+    lower, upper = chi2.ppf([0.025, 0.975], 3)
+    share = chi2.cdf(scale * upper, 3) - chi2.cdf(scale * lower, 3)
+    median = chi2.median(3)
+    median_std = 0.5 / np.sqrt(n) / chi2.pdf(median, 3)
+    for name in ("position", "orientation", "velocity"):
+        figures = {
+            key: getattr(metrics, f"nees_{name}_{key}")
+            for key in ("mean", "median", "in_band_percent")
+        }
+        assert scale * figures["mean"] == pytest.approx(1.0, abs=4 * np.sqrt(2 / 3 / n)), name
+        assert scale * figures["median"] == pytest.approx(median / 3, abs=4 * median_std / 3), name
+        assert figures["in_band_percent"] == pytest.approx(
+            100 * share, abs=400 * np.sqrt(share * (1 - share) / n)
+        ), name
+
+
+def test_covariances_without_an_inverse_are_no_evidence() -> None:
+    trajectory, sequence = consistent(1.0, 100)
+    singular = np.zeros_like(trajectory.position_covariance)
+    singular[-1] = np.eye(3)
+    half = evaluate(dataclasses.replace(trajectory, position_covariance=singular), sequence)
+    assert half.nees_position_mean == half.nees_position_median
+    singular[-1] = 0.0
+    none = evaluate(dataclasses.replace(trajectory, position_covariance=singular), sequence)
+    assert (none.nees_position_median, none.nees_position_mean) == (None, None)
+    assert none.nees_position_in_band_percent is None
+    assert none.nees_orientation_mean is not None
+
+
+def test_the_true_velocity_is_that_of_the_path() -> None:
+    """Against the derivative of the curve; a central difference is off by its third derivative
+    times the square of the period over six."""
+    position, orientation = rolling()
+    comparison = compare(
+        estimate_at(recording(position, orientation), position, orientation),
+        recording(position, orientation),
+    )
+    s = np.linspace(0.0, 1.0, 600)
+    rate = 1.0 / (599 * PERIOD_NS * 1e-9)  # of s
+    velocity = rate * np.stack([6 * np.cos(2 * s), 6 * np.sin(2 * s), np.full_like(s, 0.1)], axis=1)
+    inner = slice(2, -1)  # without the corner where the robot sets off and the end
+    np.testing.assert_allclose(
+        comparison.truth.velocity[STILL:][inner],
+        velocity[inner],
+        atol=1.01 * 24 * rate**3 * (PERIOD_NS * 1e-9) ** 2 / 6,
+    )
+
+
+def test_every_update_counts_once_in_the_innovations() -> None:
+    truth = straight()
+    sequence = recording(*truth)
+    n = len(truth[0])
+    cable_nis = np.full(n, np.nan)
+    cable_nis[10:STILL] = 50.0  # at rest
+    cable_nis[-60:-59], cable_nis[-59:-1], cable_nis[-1:] = 0.5, 1.0, 3.0
+    trajectory = dataclasses.replace(estimate_at(sequence, *truth), cable_nis=cable_nis)
+    metrics = evaluate(trajectory, sequence)
+    assert metrics.nis_cables_mean == pytest.approx(1.5)
+    assert metrics.nis_cables_median == 1.0
+    assert (metrics.nis_ground_mean, metrics.nis_ground_median) == (None, None)
+
+
+def test_innovations_know_their_degrees_of_freedom() -> None:
+    truth = straight()
+    sequence = recording(*truth)
+    lengths = sequence.cables.lengths.copy()
+    lengths[300:, [2, 7]] = np.nan  # two sensors fail
+    cables = CableStream(sequence.cables.t_ns[5::2], lengths[5::2])  # late, and at half the rate
+    contacts = np.zeros((len(truth[0]), 6), dtype=bool)
+    contacts[:, [0, 3]] = True
+    trajectory = dataclasses.replace(estimate_at(sequence, *truth), contacts=contacts)
+    comparison = compare(trajectory, dataclasses.replace(sequence, cables=cables))
+    expected = [0] * 5 + [9] * (301 - 5) + [7] * (len(truth[0]) - 301)
+    np.testing.assert_array_equal(comparison.cable_innovations.degrees_of_freedom, expected)
+    np.testing.assert_array_equal(comparison.ground_innovations.degrees_of_freedom, 2)
+
+
+def test_bands_are_those_of_the_chi_square_tables() -> None:
+    lower, upper = band([0, 3, 9])
+    np.testing.assert_allclose(lower, [np.nan, 0.216 / 3, 2.700 / 9], atol=2e-4)
+    np.testing.assert_allclose(upper, [np.nan, 9.348 / 3, 19.023 / 9], atol=2e-4)
+
+
 def test_agrees_with_the_evo_programs() -> None:
     """`evo_ape --align_origin` and `evo_rpe` on the same poses give the same figures."""
     main_ape, main_rpe = pytest.importorskip("evo.main_ape"), pytest.importorskip("evo.main_rpe")
@@ -410,6 +537,7 @@ def test_metrics_file_round_trip(tmp_path: Path) -> None:
     assert Metrics.load(path) == metrics
     content = json.loads(path.read_text())
     assert content["endcap_rmse_m"] is None
+    assert content["nis_cables_median"] is None
     assert {
         "path_length_m",
         "final_drift_m",
@@ -421,6 +549,10 @@ def test_metrics_file_round_trip(tmp_path: Path) -> None:
         "endcap_rmse_m",
         "cable_rmse_m",
         "nees_position_median",
+        "nees_orientation_in_band_percent",
+        "nees_velocity_mean",
+        "nis_cables_median",
+        "nis_ground_mean",
         "runtime_s",
         "real_time_factor",
         "path_length_com_m",

@@ -11,8 +11,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tensegrity.evaluation import Alignment, Comparison, Motion
-from tensegrity.plotting import cable_lengths, endcap_errors, pose, save_figures, style, top_view
+from tensegrity.evaluation import Alignment, Comparison, Innovations, Motion
+from tensegrity.evaluation.consistency import band
+from tensegrity.plotting import (
+    cable_lengths,
+    consistency,
+    endcap_errors,
+    pose,
+    save_figures,
+    style,
+    top_view,
+)
 
 pytest.importorskip("matplotlib", reason="figures need the 'viz' extra")
 from matplotlib.figure import Figure
@@ -28,15 +37,23 @@ def comparison(method: str, offset: float, n: int = 300) -> Comparison:
     endcaps = np.random.default_rng(0).normal(size=(6, 3)) * np.ones((n, 1, 1))
     lengths = 1.0 + 0.2 * np.sin(t)[:, None] * np.linspace(0.5, 1.0, 9)
     eye = np.tile(np.eye(3), (n, 1, 1))
+    velocity = np.gradient(position, t, axis=0)
+    nis = np.random.default_rng(1).chisquare(9, n) / 9
+    nis[:20] = np.nan
     return Comparison(
         method=method,
         sequence="right",
         cable_names=CABLES,
         t_s=t,
-        estimate=Motion(position + offset, orientation, endcaps + offset, lengths + offset),
-        truth=Motion(position, orientation, endcaps, lengths),
+        estimate=Motion(
+            position + offset, orientation, velocity, endcaps + offset, lengths + offset
+        ),
+        truth=Motion(position, orientation, velocity, endcaps, lengths),
         position_covariance=0.04 * eye,
         orientation_covariance=0.01 * eye,
+        velocity_covariance=0.01 * eye,
+        cable_innovations=Innovations(nis, np.full(n, 9.0)),
+        ground_innovations=Innovations(np.sqrt(nis), np.linspace(0, 4, n).round()),
         alignment=Alignment.POSE,
         still=1,
         initial_tilt_rad=0.0,
@@ -61,6 +78,7 @@ def test_figures_are_written_and_not_blank(runs: dict[str, Comparison], tmp_path
     paths = save_figures(runs, tmp_path / "new" / "figures")
     assert {path.name for path in paths} == {
         "cable_lengths.png",
+        "consistency.png",
         "endcap_errors.png",
         "pose.png",
         "top_view.png",
@@ -90,7 +108,11 @@ def test_without_true_endcaps_only_pose_figures(
         )
         for label, run in runs.items()
     }
-    assert {path.name for path in save_figures(unknown, tmp_path)} == {"pose.png", "top_view.png"}
+    assert {path.name for path in save_figures(unknown, tmp_path)} == {
+        "consistency.png",
+        "pose.png",
+        "top_view.png",
+    }
 
 
 @pytest.mark.parametrize(
@@ -99,6 +121,7 @@ def test_without_true_endcaps_only_pose_figures(
         (cable_lengths.draw, 9, {"length [m]"}),
         (endcap_errors.draw, 4, {"error [mm]"}),
         (top_view.draw, 1, {"y [m]"}),
+        (consistency.draw, 4, {"NEES", "NIS"}),
         (
             pose.draw,
             6,
@@ -131,6 +154,46 @@ def test_position_bands_are_two_standard_deviations(runs: dict[str, Comparison])
     band = figure.axes[0].collections[0].get_paths()[0].vertices
     first = band[np.isclose(band[:, 0], 0.0)][:, 1]
     np.testing.assert_allclose([first.min(), first.max()], [0.1 - 0.4, 0.1 + 0.4])
+
+
+def test_consistency_panels_show_squares_and_their_bands(runs: dict[str, Comparison]) -> None:
+    figure = consistency.draw(runs)
+    assert {panel.get_yscale() for panel in figure.axes} == {"log"}
+    position, _, cables, ground = figure.axes
+    paper, full = position.lines
+    np.testing.assert_allclose(paper.get_ydata(), 0.1**2 / 0.04)  # three equal errors, over three
+    np.testing.assert_allclose(full.get_ydata(), 0.02**2 / 0.04)
+    for panel, ends in ((position, band(3)), (cables, band(9))):
+        heights = panel.collections[0].get_paths()[0].vertices[:, 1]
+        np.testing.assert_allclose([heights.min(), heights.max()], ends)
+    innovations = runs["full"].cable_innovations
+    np.testing.assert_array_equal(cables.lines[1].get_ydata(), innovations.nis[20:])
+    # One piece of band for each number of feet, beginning with the first foot.
+    bands = [path.vertices for path in ground.collections[0].get_paths()]
+    assert min(piece[:, 1].min() for piece in bands) == pytest.approx(float(band(1)[0]))
+    assert max(piece[:, 1].max() for piece in bands) == pytest.approx(float(band(1)[1]))
+    assert min(piece[:, 0].min() for piece in bands) == pytest.approx(0.38, abs=0.02)
+
+
+def test_consistency_without_innovations_has_no_panels_for_them(
+    runs: dict[str, Comparison],
+) -> None:
+    none = Innovations(np.full(300, np.nan), np.full(300, 9.0))
+    loose = dataclasses.replace(runs["paper"], cable_innovations=none, ground_innovations=none)
+    alone = consistency.draw({"paper": loose})
+    assert len(alone.axes) == 2
+    together = consistency.draw({"paper": loose, "full": runs["full"]})
+    assert len(together.axes) == 4
+    assert [len(line.get_ydata()) for line in together.axes[2].lines] == [0, 280]
+
+
+def test_consistency_of_a_robot_that_never_moves_is_empty(
+    runs: dict[str, Comparison], tmp_path: Path
+) -> None:
+    still = dataclasses.replace(runs["full"], still=300)
+    figure = consistency.draw({"full": still})
+    assert {len(line.get_ydata()) for panel in figure.axes for line in panel.lines} == {0}
+    assert style.save(figure, tmp_path / "consistency.png").is_file()
 
 
 def test_a_method_keeps_its_colour() -> None:

@@ -1,7 +1,9 @@
-"""Estimates against the truth: alignment on the still start, drift, relative pose error, shape."""
+"""Estimates against the truth: alignment on the still start, drift, relative pose error, shape,
+and whether the covariances are honest."""
 
 from tensegrity.evaluation.alignment import Alignment
 from tensegrity.evaluation.comparison import Comparison, Motion, compare
+from tensegrity.evaluation.consistency import Innovations
 from tensegrity.evaluation.metrics import Metrics, evaluate, measure
 from tensegrity.evaluation.published import TABLE_II, PublishedResult, published_result
 
@@ -9,6 +11,7 @@ __all__ = [
     "TABLE_II",
     "Alignment",
     "Comparison",
+    "Innovations",
     "Metrics",
     "Motion",
     "PublishedResult",

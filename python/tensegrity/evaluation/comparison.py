@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from tensegrity.errors import InputError
 from tensegrity.evaluation.alignment import Alignment, initial_transform, still_count
-from tensegrity.sequence.sequence import EndcapStream, PoseStream, Sequence
+from tensegrity.evaluation.consistency import Innovations, normalised_error_squared
+from tensegrity.sequence.sequence import CableStream, EndcapStream, PoseStream, Sequence
 
 if TYPE_CHECKING:
     from tensegrity.trajectory import Trajectory
@@ -31,13 +32,15 @@ MAX_TIME_DIFFERENCE_NS = 10_000_000
 class Motion:
     """Where the robot is, M stamps, E endcaps, C cables.
 
-    ``position`` (M, 3) [m] and ``orientation`` (M) of the body in the world of the truth;
-    ``endcaps_body`` (M, E, 3) [m] in the body frame and ``cable_lengths`` (M, C) [m] between them,
-    in the order of ``robot.cables``. Rows without knowledge of the endcaps are NaN.
+    ``position`` (M, 3) [m], ``orientation`` (M) and ``velocity`` (M, 3) [m/s] of the body in the
+    world of the truth; ``endcaps_body`` (M, E, 3) [m] in the body frame and ``cable_lengths``
+    (M, C) [m] between them, in the order of ``robot.cables``. Rows without knowledge of the endcaps
+    are NaN.
     """
 
     position: FloatArray
     orientation: Rotation
+    velocity: FloatArray
     endcaps_body: FloatArray
     cable_lengths: FloatArray
 
@@ -47,8 +50,10 @@ class Comparison:
     """One estimate and the truth, at the M stamps of the estimate that the truth covers.
 
     * ``t_s`` (M,) since the first sample of the recording [s]
-    * ``position_covariance``, ``orientation_covariance`` (M, 3, 3) of the estimate in the world of
-      the truth [m^2], [rad^2]
+    * ``position_covariance``, ``orientation_covariance``, ``velocity_covariance`` (M, 3, 3) of the
+      estimate in the world of the truth [m^2], [rad^2], [m^2/s^2]
+    * ``cable_innovations``, ``ground_innovations`` of the filter, which need no truth; the degrees
+      of freedom are the cables measured at the newest stamp and the feet held as contacts
     * ``still`` number of leading stamps at which the robot has not moved yet
     * ``initial_tilt_rad`` error of the estimated vertical over those stamps, before alignment
     """
@@ -61,9 +66,27 @@ class Comparison:
     truth: Motion
     position_covariance: FloatArray
     orientation_covariance: FloatArray
+    velocity_covariance: FloatArray
+    cable_innovations: Innovations
+    ground_innovations: Innovations
     alignment: Alignment
     still: int
     initial_tilt_rad: float
+
+    def position_nees(self) -> FloatArray:
+        """Normalised error squared of the position per degree of freedom (M,)."""
+        error = self.estimate.position - self.truth.position
+        return normalised_error_squared(error, self.position_covariance)
+
+    def orientation_nees(self) -> FloatArray:
+        """That of the rotation vector, in the world, from the true to the estimated orientation."""
+        error = (self.estimate.orientation * self.truth.orientation.inv()).as_rotvec()
+        return normalised_error_squared(error, self.orientation_covariance)
+
+    def velocity_nees(self) -> FloatArray:
+        """That of the velocity."""
+        error = self.estimate.velocity - self.truth.velocity
+        return normalised_error_squared(error, self.velocity_covariance)
 
 
 def compare(
@@ -72,8 +95,8 @@ def compare(
     """Bring an estimate to the stamps and into the world of the truth.
 
     The truth is interpolated at the estimate's stamps (linearly, orientations on the great circle);
-    stamps outside the truth or further than ``MAX_TIME_DIFFERENCE_NS`` from any true sample are
-    left out.
+    its velocity is the central difference of its positions at their own stamps. Stamps outside the
+    truth or further than ``MAX_TIME_DIFFERENCE_NS`` from any true sample are left out.
 
     Raises :class:`InputError` when the recording has no ground truth or it covers no estimate.
     """
@@ -91,7 +114,7 @@ def compare(
             hint="is this the recording that the run was made from?",
         )
     t_ns = trajectory.t_ns[covered]
-    true_position, true_orientation = _interpolate_poses(sequence.groundtruth, t_ns)
+    true_position, true_orientation, true_velocity = _interpolate(sequence.groundtruth, t_ns)
     position = trajectory.position[covered]
     orientation = Rotation.from_quat(trajectory.quaternion[covered])
 
@@ -117,17 +140,26 @@ def compare(
         estimate=Motion(
             position=rotation.apply(position) + translation,
             orientation=rotation * orientation,
+            velocity=rotation.apply(trajectory.velocity[covered]),
             endcaps_body=endcaps_body,
             cable_lengths=_distances(endcaps_body, cables),
         ),
         truth=Motion(
             position=true_position,
             orientation=true_orientation,
+            velocity=true_velocity,
             endcaps_body=true_endcaps_body,
             cable_lengths=_distances(true_endcaps_body, cables),
         ),
         position_covariance=r @ trajectory.position_covariance[covered] @ r.T,
         orientation_covariance=r @ trajectory.orientation_covariance[covered] @ r.T,
+        velocity_covariance=r @ trajectory.velocity_covariance[covered] @ r.T,
+        cable_innovations=Innovations(
+            trajectory.cable_nis[covered], _measured_cables(sequence.cables, t_ns)
+        ),
+        ground_innovations=Innovations(
+            trajectory.ground_nis[covered], trajectory.contacts[covered].sum(axis=1, dtype=float)
+        ),
         alignment=alignment,
         still=still,
         initial_tilt_rad=tilt,
@@ -142,12 +174,25 @@ def _covered(t_ns: IntArray, truth_ns: IntArray) -> BoolArray:
     return inside & (nearest <= MAX_TIME_DIFFERENCE_NS)
 
 
-def _interpolate_poses(truth: PoseStream, t_ns: IntArray) -> tuple[FloatArray, Rotation]:
+def _interpolate(truth: PoseStream, t_ns: IntArray) -> tuple[FloatArray, Rotation, FloatArray]:
+    """Position, orientation and velocity of the truth at ``t_ns``."""
     # Relative stamps: nanoseconds since 1970 do not fit into the mantissa of a double.
     known = (truth.t_ns - truth.t_ns[0]) * 1e-9
     wanted = (t_ns - truth.t_ns[0]) * 1e-9
-    position = np.stack([np.interp(wanted, known, column) for column in truth.position.T], axis=1)
-    return position, Slerp(known, Rotation.from_quat(truth.quaternion))(wanted)
+
+    def at_wanted(values: FloatArray) -> FloatArray:
+        return np.stack([np.interp(wanted, known, column) for column in values.T], axis=1)
+
+    velocity = np.gradient(truth.position, known, axis=0)
+    orientation = Slerp(known, Rotation.from_quat(truth.quaternion))(wanted)
+    return at_wanted(truth.position), orientation, at_wanted(velocity)
+
+
+def _measured_cables(cables: CableStream, t_ns: IntArray) -> FloatArray:
+    """Number of lengths in the newest measurement at each stamp (M,), 0 before the first."""
+    counts = np.isfinite(cables.lengths).sum(axis=1)
+    newest = np.searchsorted(cables.t_ns, t_ns, side="right")  # 0: none yet
+    return np.concatenate([[0.0], counts])[newest]
 
 
 def _endcaps_in_body(
