@@ -31,6 +31,7 @@ class Summary:
     z_drift_m: float | None
     endcap_rmse_m: float | None
     nees_position_median: float | None
+    nees_orientation_median: float | None
 
 
 def summary(runs: Sequence[Metrics]) -> Summary:
@@ -51,6 +52,7 @@ def summary(runs: Sequence[Metrics]) -> Summary:
         z_drift_m=mean("z_drift_m"),
         endcap_rmse_m=mean("endcap_rmse_m"),
         nees_position_median=mean("nees_position_median"),
+        nees_orientation_median=mean("nees_orientation_median"),
     )
 
 
@@ -63,6 +65,7 @@ _COLUMNS = (
     ("z drift [cm]", "z_drift_m", ".1f", 100),
     ("endcaps [mm]", "endcap_rmse_m", ".0f", 1000),
     ("NEES", "nees_position_median", ".1f", 1),
+    ("rot. NEES", "nees_orientation_median", ".1f", 1),
 )
 
 
@@ -107,5 +110,6 @@ def _published_row(group: str) -> Iterable[str]:
             z_drift_m=None,
             endcap_rmse_m=None,
             nees_position_median=None,
+            nees_orientation_median=None,
         )
         yield _row(group, "T, Table II", published)

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
@@ -325,6 +326,37 @@ def test_evaluate_prints_and_writes(run: Path) -> None:
     assert "aligned by initial pose" in result.stdout
     assert json.loads((run / "metrics.json").read_text())["ate_rmse_m"] < 1e-6
     assert (run / "figures" / "cable_lengths.png").is_file()
+    assert (run / "figures" / "consistency.png").is_file()
+
+
+@pytest.mark.usefixtures("no_figures")
+def test_evaluate_judges_the_covariances(recording: Path, tmp_path: Path) -> None:
+    sequence = read(recording)
+    truth = true_trajectory(sequence)
+    creeping = truth.position.copy()
+    creeping[:, 0] += 0.01e-9 * truth.t_ns  # 1 cm/s, the estimate's standard deviation
+    poses = dataclasses.replace(sequence.groundtruth, position=creeping)
+    write(dataclasses.replace(sequence, groundtruth=poses), tmp_path / "moving")
+    write_run(
+        dataclasses.replace(truth, cable_nis=1.0 + 0.5 * (-1.0) ** np.arange(len(truth.t_ns))),
+        tmp_path / "run",
+        sequence=tmp_path / "moving",
+        robot=sequence.robot,
+        config=FilterConfig.load("full"),
+    )
+    result = tensegrity("evaluate", tmp_path / "run")
+    assert result.exit_code == 0, result.output
+
+    def printed(label: str) -> str:
+        row = next(line for line in result.stdout.splitlines() if label in line)
+        return row.split("│")[3].strip()
+
+    metrics = json.loads((tmp_path / "run" / "metrics.json").read_text())
+    assert printed("NEES of position, mean") == f"{metrics['nees_position_mean']:.2f}"
+    assert printed("NEES of velocity, median") == "0.33"  # one of three axes
+    assert printed("NEES of velocity, in 95 % band") == "100"
+    assert printed("NIS of cables, mean") == "1.00"
+    assert printed("NIS of ground, mean") == "–"
 
 
 @pytest.mark.usefixtures("no_figures")
