@@ -4,6 +4,7 @@
 #include <pybind11/functional.h>
 
 #include <chrono>
+#include <variant>
 
 #include "bindings.hpp"
 
@@ -11,7 +12,8 @@ namespace tensegrity::bindings {
 
 namespace {
 
-using Estimator = PrismEstimator<double>;
+using Loose = PrismEstimator<double, LooseFilter<double>>;
+using Tight = PrismEstimator<double, TightFilter<double>>;
 using State = PrismState<double>;
 using Config = PrismConfig<double>;
 using V3 = Vector3<double>;
@@ -19,6 +21,42 @@ using V3 = Vector3<double>;
 using Stamps = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Bools = py::array_t<bool, py::array::c_style | py::array::forcecast>;
+
+// Either filter behind one interface: Python chooses by the configuration.
+class Estimator {
+ public:
+  Estimator(const Prism<double>& robot, const Config& config, bool tight) {
+    if (tight) {
+      any_.emplace<Tight>(robot, config);
+    } else {
+      any_.emplace<Loose>(robot, config);
+    }
+  }
+
+  Status imu(Nanoseconds t, const V3& gyro, const V3& accel) {
+    return visit([&](auto& e) { return e.imu(t, gyro, accel); });
+  }
+  Status cables(Nanoseconds t, const CableLengths<double>& lengths) {
+    return visit([&](auto& e) { return e.cables(t, lengths); });
+  }
+  Status contacts(Nanoseconds t, const std::array<bool, 6>& flags) {
+    return visit([&](auto& e) { return e.contacts(t, flags); });
+  }
+  bool initialized() const {
+    return std::visit([](const auto& e) { return e.initialized(); }, any_);
+  }
+  State state() const {
+    return std::visit([](const auto& e) { return e.state(); }, any_);
+  }
+
+ private:
+  template <typename Call>
+  Status visit(const Call& call) {
+    return std::visit(call, any_);
+  }
+
+  std::variant<Loose, Tight> any_;
+};
 
 void check_rows(const py::array& a, const char* name, py::ssize_t rows, py::ssize_t cols) {
   const bool good = cols == 0 ? a.ndim() == 1 && a.shape(0) == rows
@@ -80,6 +118,8 @@ class Recorder {
            [&](const State& s, double* to) { matrix(s.rotation_covariance, to); });
     column("velocity_covariance", {3, 3},
            [&](const State& s, double* to) { matrix(s.velocity_covariance, to); });
+    column("cable_nis", {}, [](const State& s, double* to) { *to = s.cable_nis; });
+    column("ground_nis", {}, [](const State& s, double* to) { *to = s.ground_nis; });
     py::array_t<bool> contacts({py::ssize_t(states_.size()), py::ssize_t(6)});
     for (std::size_t k = 0; k < states_.size(); ++k) {
       for (std::size_t i = 0; i < 6; ++i)
@@ -100,6 +140,7 @@ class Recorder {
     counter("contacts_dropped", &PrismHealth::contacts_dropped);
     counter("shape_failures", &PrismHealth::shape_failures);
     counter("contacts_rejected", &PrismHealth::contacts_rejected);
+    counter("cables_rejected", &PrismHealth::cables_rejected);
     out["health"] = health;
     return out;
   }
@@ -194,6 +235,11 @@ void bind_estimator(py::module_& m) {
       .value("INTERVAL_MEAN", ImuSampling::kIntervalMean)
       .value("INSTANTANEOUS", ImuSampling::kInstantaneous)
       .finalize();
+  py::native_enum<Terrain>(m, "Terrain", "enum.Enum")
+      .value("FLAT", Terrain::kFlat)
+      .value("SLOPE", Terrain::kSlope)
+      .value("UNKNOWN", Terrain::kUnknown)
+      .finalize();
 
   py::class_<Config>(m, "PrismConfig", "Settings, priors and noises of the prism's estimator.")
       .def(py::init<>())
@@ -227,7 +273,23 @@ void bind_estimator(py::module_& m) {
       .def_readwrite("contact_position_std", &Config::contact_position_std)
       .def_readwrite("spin_walk", &Config::spin_walk)
       .def_readwrite("shape_std_rest", &Config::shape_std_rest)
-      .def_readwrite("shape_std_moving", &Config::shape_std_moving);
+      .def_readwrite("shape_std_moving", &Config::shape_std_moving)
+      .def_readwrite("terrain", &Config::terrain)
+      .def_readwrite("contact_error", &Config::contact_error)
+      .def_readwrite("cable_gate", &Config::cable_gate)
+      .def_readwrite("cable_offset_std", &Config::cable_offset_std)
+      .def_readwrite("ground_slope_std", &Config::ground_slope_std)
+      .def_readwrite("endcap_acceleration_rest", &Config::endcap_acceleration_rest)
+      .def_readwrite("endcap_acceleration_moving", &Config::endcap_acceleration_moving)
+      .def_readwrite("active_force", &Config::active_force)
+      .def_readwrite("active_rate", &Config::active_rate)
+      .def_readwrite("creep_std", &Config::creep_std)
+      .def_readwrite("slip_length", &Config::slip_length)
+      .def_readwrite("slip_speed", &Config::slip_speed)
+      .def_readwrite("foot_rise_std", &Config::foot_rise_std)
+      .def_readwrite("foot_height_std", &Config::foot_height_std)
+      .def_readwrite("ground_height_walk", &Config::ground_height_walk)
+      .def_readwrite("ground_slope_walk", &Config::ground_slope_walk);
 
   py::class_<PrismHealth>(m, "PrismHealth", "Counters since construction; see the C++ header.")
       .def_readonly("imu_dropped", &PrismHealth::imu_dropped)
@@ -235,7 +297,8 @@ void bind_estimator(py::module_& m) {
       .def_readonly("cables_dropped", &PrismHealth::cables_dropped)
       .def_readonly("contacts_dropped", &PrismHealth::contacts_dropped)
       .def_readonly("shape_failures", &PrismHealth::shape_failures)
-      .def_readonly("contacts_rejected", &PrismHealth::contacts_rejected);
+      .def_readonly("contacts_rejected", &PrismHealth::contacts_rejected)
+      .def_readonly("cables_rejected", &PrismHealth::cables_rejected);
 
   using Six = Eigen::Matrix<double, 6, 3>;
   py::class_<State>(m, "PrismState", "One state of the prism, in SI units.")
@@ -261,15 +324,20 @@ void bind_estimator(py::module_& m) {
       .def_readonly("velocity_covariance", &State::velocity_covariance, "(3, 3) [m^2/s^2]")
       .def_readonly("position_covariance", &State::position_covariance, "(3, 3) [m^2]")
       .def_readonly("contacts", &State::contacts, "endcaps held as contacts")
+      .def_readonly("cable_nis", &State::cable_nis,
+                    "of the newest lengths, per degree of freedom; NaN: none")
+      .def_readonly("ground_nis", &State::ground_nis,
+                    "of the newest heights of the feet, per degree of freedom; NaN: none")
       .def_readonly("health", &State::health);
 
   py::class_<Estimator>(m, "PrismEstimator",
                         "Streaming estimator: IMU, cables and contacts in, state out.")
-      .def(py::init<const Prism<double>&, const Config&>(), py::arg("robot"), py::arg("config"))
+      .def(py::init<const Prism<double>&, const Config&, bool>(), py::arg("robot"),
+           py::arg("config"), py::arg("tight") = true)
       .def("imu", &Estimator::imu, py::arg("t"), py::arg("gyro"), py::arg("accel"),
            "One IMU sample: t [ns], angular velocity (3,) [rad/s], specific force (3,) [m/s^2].")
       .def("cables", &Estimator::cables, py::arg("t"), py::arg("lengths"),
-           "Cable lengths: t [ns], (9,) [m] in the order of PRISM_CABLES.")
+           "Cable lengths: t [ns], (9,) [m] in the order of PRISM_CABLES, NaN: not measured.")
       .def(
           "contacts",
           [](Estimator& e, Nanoseconds t, const Bools& flags) {
@@ -278,9 +346,6 @@ void bind_estimator(py::module_& m) {
           py::arg("t"), py::arg("flags"), "Contact flags: t [ns], (6,) true on the ground.")
       .def_property_readonly("state", &Estimator::state)
       .def_property_readonly("initialized", &Estimator::initialized)
-      .def_property_readonly(
-          "filter", [](const Estimator& e) { return e.belief(); },
-          "A copy of the invariant filter's mean and covariance.")
       .def("replay", &replay, py::arg("imu_t"), py::arg("gyro"), py::arg("accel"),
            py::arg("cables_t"), py::arg("lengths"), py::arg("contacts_t") = py::none(),
            py::arg("flags") = py::none(), py::arg("progress") = py::none(),

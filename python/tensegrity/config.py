@@ -24,17 +24,21 @@ class Settings(StrictModel):
     """Which models the filter uses, and its limits."""
 
     method: Literal["paper", "full"] = field("the estimator of T, or the best one")
+    filter: Literal["loose", "tight"] = field(
+        "loose: a shape from the cables corrects the pose (T); tight: one state for both"
+    )
     shape: Literal["least_squares", "tracker"] = field(
-        "endcaps from cables: anew at each sample (T eq. 15), or tracked over time"
+        "filter: loose, endcaps from cables: anew at each sample (T eq. 15), or tracked over time"
     )
     spin: Literal["fixed", "estimated"] = field(
-        "angle of the shape about the base rod, which no cable observes: constant, or a state"
+        "filter: loose, angle of the shape about the base rod, which no cable observes: constant, "
+        "or a state"
     )
     contact_point: Literal["centre", "rolling"] = field(
-        "endcaps touch as fixed points (T), or roll as spheres"
+        "filter: loose, endcaps touch as fixed points (T), or roll as spheres"
     )
     contact_noise: Literal["constant", "from_shape"] = field(
-        "covariance of a contact's position: contact_position_std, or that of the shape"
+        "filter: loose, covariance of a contact's position: contact_position_std, or the shape's"
     )
     imu_sampling: Literal["interval_mean", "instantaneous"] = field(
         "a sample is the mean since the previous stamp, or the value at its stamp"
@@ -50,9 +54,23 @@ class Settings(StrictModel):
     max_imu_gap: float = field("longer gaps between IMU samples widen the state", unit="s", gt=0)
     max_latency: float = field("measurements older than this are dropped", unit="s", ge=0)
     chi_square_gate: float = field(
-        "probability mass of innovations that are accepted, 0: all", ge=0, lt=1
+        "filter: loose, probability mass of contact innovations that are accepted, 0: all",
+        ge=0,
+        lt=1,
     )
     gravity: float = field("acceleration of gravity, downward", unit="m/s^2", gt=0)
+    terrain: Literal["flat", "slope", "unknown"] = field(
+        "filter: tight, the ground is level, one plane of unknown slope, or changes on the way"
+    )
+    contact_error: float = field(
+        "filter: tight, share of contact flags that are wrong: flags are evidence, not truth",
+        gt=0,
+        lt=0.5,
+    )
+    cable_gate: float = field(
+        "filter: tight, single lengths are left out beyond so many standard deviations, 0: never",
+        ge=0,
+    )
 
     @model_validator(mode="after")
     def _shape_has_a_covariance(self) -> Settings:
@@ -77,6 +95,8 @@ class Priors(StrictModel):
     accelerometer_bias: Vector3 = field("accelerometer bias, IMU frame", unit="m/s^2")
     accelerometer_bias_std: float = field("accelerometer bias", unit="m/s^2", ge=0)
     spin_std: float = field("spin", unit="rad", ge=0)
+    cable_offset_std: float = field("constant error of a cable length", unit="m", ge=0)
+    ground_slope_std: float = field("slope of the ground, unless terrain: flat", unit="rad", ge=0)
 
 
 class Noises(StrictModel):
@@ -105,6 +125,37 @@ class Noises(StrictModel):
     )
     shape_std_moving: float = field(
         "random walk of the shape in motion, with shape: tracker", unit="m/sqrt(s)", gt=0
+    )
+    endcap_acceleration_rest: float = field(
+        "white acceleration of the other rods' endcaps at rest", unit="m/s/sqrt(s)", gt=0
+    )
+    endcap_acceleration_moving: float = field(
+        "white acceleration of the other rods' endcaps at full activity",
+        unit="m/s/sqrt(s)",
+        gt=0,
+    )
+    active_force: float = field(
+        "deviation of the specific force from gravity at full activity", unit="m/s^2", gt=0
+    )
+    active_rate: float = field("rate of the base rod at full activity", unit="rad/s", gt=0)
+    creep_std: float = field("creep of a foot that stands still", unit="m/sqrt(s)", gt=0)
+    slip_length: float = field(
+        "path a fully loaded foot slips between two decisions of friction", unit="m", ge=0
+    )
+    slip_speed: float = field(
+        "a foot that slips faster informs across its slip alone", unit="m/s", gt=0
+    )
+    foot_rise_std: float = field("motion of a foot across the ground", unit="m/sqrt(s)", gt=0)
+    foot_height_std: float = field("height of a foot above the ground", unit="m*sqrt(s)", gt=0)
+    ground_height_walk: float = field(
+        "random walk of the ground's height in motion, with terrain: unknown",
+        unit="m/sqrt(s)",
+        ge=0,
+    )
+    ground_slope_walk: float = field(
+        "random walk of the ground's slope in motion, with terrain: unknown",
+        unit="1/sqrt(s)",
+        ge=0,
     )
 
 

@@ -33,7 +33,8 @@ class PrismEstimator(_core.PrismEstimator):
     ) -> None:
         robot = robot if isinstance(robot, Robot) else load_robot(robot)
         config = config if isinstance(config, FilterConfig) else FilterConfig.load(config)
-        super().__init__(core_robot(robot), core_config(config))
+        tight = config.settings.filter == "tight"
+        super().__init__(core_robot(robot), core_config(config), tight)
 
 
 def estimate(
@@ -102,6 +103,7 @@ _CORE_ENUMS = {
     "contact_point": _core.ContactPoint,
     "contact_noise": _core.ContactNoise,
     "imu_sampling": _core.ImuSampling,
+    "terrain": _core.Terrain,
 }
 
 
@@ -110,7 +112,7 @@ def core_config(config: FilterConfig) -> _core.PrismConfig:
     core = _core.PrismConfig()
     for section in ("settings", "priors", "noises"):
         for name, value in getattr(config, section):
-            if (section, name) == ("settings", "method"):
+            if (section, name) in (("settings", "method"), ("settings", "filter")):
                 continue
             if name in _CORE_ENUMS:
                 value = _CORE_ENUMS[name][value.upper()]

@@ -58,4 +58,35 @@ Vector3<Scalar> load_share(const Endcaps<Scalar>& world, const std::array<int, 6
                              ground.rowwise().mean());
 }
 
+// Shares for the endcaps that are known to carry load: one takes all, two share as a lever does,
+// three as above; of more the lowest three count. Each is at least `least`, and they sum to one;
+// endcaps without load have zero.
+template <typename Scalar>
+std::array<Scalar, 6> support_shares(const Endcaps<Scalar>& world,
+                                     const std::array<bool, 6>& loaded, Scalar least) {
+  std::array<int, 6> feet{};
+  std::size_t count = 0;
+  for (const int endcap : lowest_first(world)) {
+    if (loaded[std::size_t(endcap)] && count < 3) feet[count++] = endcap;
+  }
+  Vector3<Scalar> share(1, 0, 0);
+  if (count == 2) {
+    const Vector<Scalar, 2> centre = world.template topRows<2>().rowwise().mean();
+    const Vector<Scalar, 2> a = world.col(feet[0]).template head<2>();
+    const Vector<Scalar, 2> lever = world.col(feet[1]).template head<2>() - a;
+    const Scalar far = lever.dot(centre - a) / lever.squaredNorm();
+    share << 1 - far, far, 0;
+  } else if (count == 3) {
+    share = load_share(world, feet);
+  }
+  std::array<Scalar, 6> shares{};
+  Scalar sum = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const Scalar s = share[Eigen::Index(k)];
+    sum += shares[std::size_t(feet[k])] = s > least ? s : least;
+  }
+  for (std::size_t k = 0; k < count; ++k) shares[std::size_t(feet[k])] /= sum;
+  return shares;
+}
+
 }  // namespace tensegrity::contact

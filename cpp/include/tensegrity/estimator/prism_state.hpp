@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 
 #include "tensegrity/estimator/pending.hpp"
 
@@ -16,6 +17,7 @@ struct PrismHealth {
   std::uint32_t contacts_dropped = 0;   // out of order or too late
   std::uint32_t shape_failures = 0;     // lengths that no shape of this robot fits
   std::uint32_t contacts_rejected = 0;  // corrections that failed the chi-square gate
+  std::uint32_t cables_rejected = 0;    // single lengths that failed the filter's gate
 };
 
 template <typename Scalar>
@@ -36,6 +38,9 @@ struct PrismState {
   Matrix3<Scalar> velocity_covariance = Matrix3<Scalar>::Zero();      // world [m^2/s^2]
   Matrix3<Scalar> position_covariance = Matrix3<Scalar>::Zero();      // world [m^2]
   std::array<bool, 6> contacts{};  // endcaps that the filter holds as contacts
+  // Normalised innovation squared of the newest correction per degree of freedom, NaN: none yet.
+  Scalar cable_nis = std::numeric_limits<Scalar>::quiet_NaN();
+  Scalar ground_nis = std::numeric_limits<Scalar>::quiet_NaN();  // of the feet's heights
   PrismHealth health;
 };
 

@@ -2,9 +2,21 @@
 // sensor noise and bias priors explain.
 #pragma once
 
+#include <array>
+
+#include "tensegrity/robot/prism.hpp"
 #include "tensegrity/types.hpp"
 
 namespace tensegrity {
+
+// What a robot at rest showed: all that a filter starts from.
+template <typename Scalar>
+struct AtRest {
+  Vector3<Scalar> gyro;          // the gyro's bias: mean rate, or its prior [rad/s]
+  Vector3<Scalar> accel;         // mean specific force, IMU frame [m/s^2]
+  int samples = 1;               // that were averaged
+  CableLengths<Scalar> lengths;  // mean lengths [m]
+};
 
 template <typename Scalar>
 class StaticStart {

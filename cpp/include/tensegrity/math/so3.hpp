@@ -152,6 +152,19 @@ class SO3 {
   Matrix3<Scalar> rotation_;
 };
 
+// The rotation that takes the unit vector `from` to the unit vector `to` without spinning about it.
+template <typename Scalar>
+Matrix3<Scalar> shortest_rotation(const Vector3<Scalar>& from, const Vector3<Scalar>& to) {
+  const Vector3<Scalar> axis = from.cross(to);
+  const Scalar sine = axis.norm(), cosine = from.dot(to);
+  if (sine < Scalar(1e-6)) {
+    if (cosine > 0) return Matrix3<Scalar>::Identity();
+    const Vector3<Scalar> any = from.unitOrthogonal();  // half a turn about it
+    return 2 * any * any.transpose() - Matrix3<Scalar>::Identity();
+  }
+  return SO3<Scalar>::Exp(axis / sine * std::atan2(sine, cosine)).matrix();
+}
+
 // Pulls a matrix that has drifted by rounding back onto SO(3): one Newton step of the polar
 // decomposition, exact to second order in the drift.
 template <typename Scalar>

@@ -1,0 +1,268 @@
+// The tightly coupled filter: cables, feet and IMU correct one state that holds pose, velocity,
+// biases, the other rods' endcaps and their velocities, the cables' offsets and the ground.
+//
+//   IMU ─────> propagate ──> endcaps ──> which of them carry load? <── contact flags (evidence)
+//                 │                              │ shares of the weight
+//   cables ──> lengths + rods ──> fold        feet: friction, height above the ground
+//                 │                              │
+//                 └──────────> one right-invariant belief <──────────┘
+//
+// Cable lengths are direct measurements, so that the velocity of every endcap is known well enough
+// to tell feet that stand from feet that slide (tight/friction.hpp).
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "tensegrity/contact/detector.hpp"
+#include "tensegrity/estimator/activity.hpp"
+#include "tensegrity/estimator/config.hpp"
+#include "tensegrity/estimator/prism_state.hpp"
+#include "tensegrity/estimator/spin_start.hpp"
+#include "tensegrity/estimator/static_start.hpp"
+#include "tensegrity/shape/solver.hpp"
+#include "tensegrity/tight/friction.hpp"
+#include "tensegrity/tight/members.hpp"
+#include "tensegrity/tight/place.hpp"
+#include "tensegrity/tight/propagate.hpp"
+
+namespace tensegrity {
+
+template <typename Scalar_ = double>
+class TightFilter {
+ public:
+  using Scalar = Scalar_;
+  using Belief = tight::Belief<Scalar>;
+  using V3 = Vector3<Scalar>;
+  using Flags = std::array<bool, 6>;
+
+  TightFilter(const Prism<Scalar>& robot, const PrismConfig<Scalar>& config)
+      : robot_(robot),
+        config_(config),
+        reference_(robot.undeformed()),
+        solver_(robot),
+        detector_(robot, detector_parameters()),
+        flag_odds_(std::log((1 - config.contact_error) / config.contact_error)),
+        activity_(config.active_force, config.active_rate),
+        belief_(robot) {}
+
+  // ---- one step: propagate, with `correct_cables` in between where there are lengths, end_step
+
+  void observe_motion(const inekf::ImuSample<Scalar>& imu, Scalar dt) {
+    activity_.update(imu.gyro - belief_.gyro_bias, imu.accel - belief_.accel_bias, config_.gravity,
+                     dt);
+  }
+
+  void propagate(const inekf::ImuSample<Scalar>& imu, Scalar dt, Scalar gyro_std,
+                 Scalar accel_std) {
+    const bool unknown = config_.terrain == Terrain::kUnknown;
+    const Scalar moving = activity_.level();
+    const tight::ProcessNoise<Scalar> noise{
+        gyro_std,
+        accel_std,
+        config_.gyroscope_bias_walk,
+        config_.accelerometer_bias_walk,
+        config_.endcap_acceleration_rest +
+            moving * (config_.endcap_acceleration_moving - config_.endcap_acceleration_rest),
+        unknown ? moving * config_.ground_height_walk : Scalar(0),
+        unknown ? moving * config_.ground_slope_walk : Scalar(0)};
+    tight::propagate(belief_, imu, dt, config_.gravity, noise);
+  }
+
+  // Lengths [m], NaN where a cable was not measured.
+  Status correct_cables(const CableLengths<Scalar>& lengths, Scalar, PrismHealth& health) {
+    const auto result =
+        tight::correct_cables(belief_, lengths, config_.cable_std, square(config_.cable_gate));
+    tight::hold_rods(belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
+    if (++cable_samples_ % kFoldEvery == 0) {
+      tight::hold_fold(belief_, robot_, kFoldThreshold, kFoldStd);
+    }
+    health.cables_rejected += std::uint32_t(result.rejected);
+    if (result.accepted > 0) cable_nis_ = result.chi_square / Scalar(result.accepted);
+    return result.accepted > 0 ? Status::kOk : Status::kRejected;
+  }
+
+  void set_contacts(const Flags& flags) {
+    flags_ = flags;
+    flags_are_new_ = true;
+  }
+
+  // The feet, once all measurements of the step are in.
+  void end_step(Scalar dt, PrismHealth&) {
+    const Endcaps<Scalar> world = belief_.endcaps_world();
+    loaded_ = detector_.update(world, dt);
+    if (flags_are_new_) loaded_ = detector_.measure(flags_, flag_odds_);
+    flags_are_new_ = false;
+    correct_feet(world, dt);
+  }
+
+  // ---- start, and what has to be given up
+
+  bool start(const AtRest<Scalar>& rest, PrismHealth& health) {
+    solver_.reset();
+    if (!used(solver_.solve(rest.lengths))) {
+      ++health.shape_failures;
+      return false;
+    }
+    belief_ = Belief(robot_);
+    const V3 force = rest.accel - config_.accelerometer_bias;
+    belief_.rotation = shortest_rotation<Scalar>(force.normalized(), V3::UnitZ());
+    belief_.gyro_bias = rest.gyro;
+    belief_.accel_bias = config_.accelerometer_bias;
+
+    auto& p = belief_.covariance;
+    const auto set = [&](int at, Scalar std) {
+      p.diagonal().template segment<3>(at).setConstant(square(std));
+    };
+    set(Belief::kRotation, config_.orientation_std);
+    p(Belief::kRotation + 2, Belief::kRotation + 2) = 0;  // heading: zero by definition
+    set(Belief::kVelocity, config_.velocity_std);
+    set(Belief::kPosition, config_.position_std);
+    p(Belief::kPosition + 2, Belief::kPosition + 2) = square(kStartHeightStd);
+    set(Belief::kGyroBias, config_.static_bias_initialization
+                               ? config_.gyroscope_std / std::sqrt(Scalar(rest.samples))
+                               : config_.gyroscope_bias_std);
+    set(Belief::kAccelBias, config_.accelerometer_bias_std);
+    p.diagonal()
+        .template segment<9>(Belief::kOffsets)
+        .setConstant(square(config_.cable_offset_std));
+    if (config_.terrain != Terrain::kFlat) {
+      p.diagonal()
+          .template segment<2>(Belief::kGround + 1)
+          .setConstant(square(config_.ground_slope_std));
+    }
+
+    const SpinStart<Scalar> spin = stand(solver_.endcaps());
+    const Endcaps<Scalar> h = spun(solver_.endcaps(), spin.angle);
+    belief_.columns(2, 1) = robot_.endcap_radius - (belief_.rotation * h).row(2).minCoeff();
+    tight::place_endcaps(belief_, h, kStartShapeStd, std::sqrt(spin.variance),
+                         config_.velocity_std);
+
+    // Gravity levels the robot: R (mean - b_a) + g = g x xi_R - R zeta_a + R n at rest.
+    {
+      const V3 g(0, 0, -config_.gravity);
+      const V3 z = belief_.rotation * force + g;
+      tight::SequentialUpdate<Scalar> update(belief_);
+      for (int k = 0; k < 3; ++k) {
+        tight::Row<Scalar> row;
+        row.add(Belief::kRotation, hat(g).row(k).transpose());
+        row.add(Belief::kAccelBias, -belief_.rotation.row(k).transpose());
+        update.correct(row, z[k], square(config_.accelerometer_std) / Scalar(rest.samples));
+      }
+    }
+    tight::hold_rods(belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
+    detector_.reset();
+    return true;
+  }
+
+  // After a gap too long to bridge [s]: anything up to a walking pace may have happened.
+  void open(Scalar dt) {
+    const Scalar away = std::min(dt, Scalar(1000));
+    auto& p = belief_.covariance;
+    const Scalar before =
+        p.diagonal().template segment<3>(Belief::kPosition).maxCoeff() + square(away);
+    belief_.columns.col(0).setZero();
+    belief_.rate.setZero();
+    const Endcaps<Scalar> h = belief_.endcaps_body();
+    p.template topRows<Belief::kGyroBias>().setZero();
+    p.template leftCols<Belief::kGyroBias>().setZero();
+    p.diagonal().template head<Belief::kPosition>().setOnes();
+    p.diagonal().template segment<3>(Belief::kPosition).setConstant(before);
+    tight::place_endcaps(belief_, h, kLostShapeStd, kLostSpinStd, Scalar(1));
+    detector_.reset();
+  }
+
+  void describe(PrismState<Scalar>& s) const {
+    s.rotation = belief_.rotation;
+    s.position = belief_.position();
+    s.velocity = belief_.velocity();
+    s.gyro_bias = belief_.gyro_bias;
+    s.accel_bias = belief_.accel_bias;
+    s.endcaps_world = belief_.endcaps_world();
+    s.endcaps_body = belief_.endcaps_body();
+    s.endcap_covariance = belief_.endcap_covariance();
+    // phi, and the gradient of it at a shape in the gauge of the turned reference.
+    s.spin = shape::spin_angle(s.endcaps_body, reference_);
+    const Vector<Scalar, 18> gradient =
+        shape::spin_gradient(s.endcaps_body, spun(reference_, s.spin));
+    s.spin_variance = gradient.dot(s.endcap_covariance * gradient);
+    s.rotation_covariance = belief_.rotation_covariance();
+    s.velocity_covariance = belief_.velocity_covariance();
+    s.position_covariance = belief_.position_covariance();
+    s.contacts = loaded_;
+    s.cable_nis = cable_nis_;
+    s.ground_nis = ground_nis_;
+  }
+
+  // The filter's own mean and covariance, in the invariant frame.
+  const Belief& belief() const { return belief_; }
+
+ private:
+  static constexpr Scalar square(Scalar x) { return x * x; }
+
+  // Endcaps of this filter err less than those the detector's defaults are for, and their errors
+  // change faster.
+  static contact::DetectorParameters<Scalar> detector_parameters() {
+    contact::DetectorParameters<Scalar> parameters;
+    parameters.evidence_time = Scalar(0.05);
+    return parameters;
+  }
+
+  void correct_feet(const Endcaps<Scalar>& world, Scalar dt) {
+    const std::array<Scalar, 6> shares =
+        contact::support_shares(world, loaded_, Scalar(kLeastLoad));
+    const tight::FootNoise<Scalar> noise{config_.creep_std, config_.slip_length, config_.slip_speed,
+                                         config_.foot_rise_std, config_.foot_height_std};
+    tight::SequentialUpdate<Scalar> update(belief_);
+    Scalar chi_square = 0, feet = 0;
+    for (int endcap = 0; endcap < 6; ++endcap) {
+      const Scalar share = shares[std::size_t(endcap)];
+      if (!(share > 0)) continue;
+      chi_square += tight::correct_foot(update, belief_, endcap, share, robot_, noise, dt);
+      feet += 1;
+    }
+    if (feet > 0) ground_nis_ = chi_square / feet;
+  }
+
+  // phi from the endcaps that are on the ground. The ground may slope.
+  SpinStart<Scalar> stand(const Endcaps<Scalar>& q) const {
+    const Scalar slope = config_.terrain == Terrain::kFlat ? Scalar(0) : config_.ground_slope_std;
+    SpinStart<Scalar> spin = find_spin(q, V3(belief_.rotation.transpose() * V3::UnitZ()), flags_,
+                                       std::hypot(kStartShapeStd, slope * robot_.rod_length / 2));
+    if (!spin.found) spin.variance = square(config_.spin_prior_std);
+    return spin;
+  }
+
+  // Endcaps at rest from averaged lengths near the fold, and the height of the lowest [m].
+  static constexpr Scalar kStartShapeStd = Scalar(0.02);
+  static constexpr Scalar kStartHeightStd = Scalar(0.03);
+  // After a long gap [m], [rad].
+  static constexpr Scalar kLostShapeStd = Scalar(0.3);
+  static constexpr Scalar kLostSpinStd = Scalar(1);
+  // What linearisation leaves out of a rod's length [m] and its rate [m/s] (tight/members.hpp).
+  static constexpr Scalar kRodLengthStd = Scalar(0.0005);
+  static constexpr Scalar kRodStretchStd = Scalar(0.002);
+  // The prior on the side of the fold, on every fourth sample with four times its variance.
+  static constexpr int kFoldEvery = 4;
+  static constexpr Scalar kFoldThreshold = Scalar(0.1);
+  static constexpr Scalar kFoldStd = Scalar(0.2);
+  // Least share of the weight that a loaded foot is taken to carry.
+  static constexpr Scalar kLeastLoad = Scalar(0.01);
+
+  Prism<Scalar> robot_;
+  PrismConfig<Scalar> config_;
+  Endcaps<Scalar> reference_;
+  shape::Solver<Scalar> solver_;
+  contact::Detector<Scalar> detector_;
+  Scalar flag_odds_;
+  Activity<Scalar> activity_;
+  Belief belief_;
+  Flags flags_{}, loaded_{};
+  bool flags_are_new_ = false;
+  int cable_samples_ = 0;
+  Scalar cable_nis_ = std::numeric_limits<Scalar>::quiet_NaN();
+  Scalar ground_nis_ = std::numeric_limits<Scalar>::quiet_NaN();
+};
+
+}  // namespace tensegrity

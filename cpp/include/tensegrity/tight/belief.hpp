@@ -1,0 +1,141 @@
+// What the tightly coupled filter knows: the base rod as a rigid body, and the endcaps of the other
+// two rods as points with velocities, all in the world and in one group.
+//
+// Mean:  X = (R, v, p, q_2 .. q_5, w_2 .. w_5) in SE_10(3) with R body to world, v and p of the
+// IMU,
+//        q_i the centre of endcap i and w_i its velocity; Euclidean part theta = (b_g, b_a, o, m)
+//        with o the constant errors of the cable sensors and m = (height, slope x, slope y) of the
+//        ground plane z = m_0 + m_1 x + m_2 y.
+// Error: right-invariant, Xbar X^-1 = exp(xi) and thetabar - theta.
+//
+// A net of rods and cables measures distances only. In this error the distance of two endcaps does
+// not depend on R at all (a rotation of everything changes no distance), so that no correction by
+// cables can invent a heading: the reason to hold endcaps in the group instead of a shape in the
+// body frame. Rods 23 and 45 keep their length by a measurement (members.hpp).
+#pragma once
+
+#include "tensegrity/math/so3.hpp"
+#include "tensegrity/robot/prism.hpp"
+
+namespace tensegrity::tight {
+
+template <typename Scalar_>
+struct Belief {
+  using Scalar = Scalar_;
+  using V3 = Vector3<Scalar>;
+  using M3 = Matrix3<Scalar>;
+
+  // Where each block of the error starts.
+  static constexpr int kRotation = 0;
+  static constexpr int kVelocity = 3;
+  static constexpr int kPosition = 6;
+  static constexpr int kGyroBias = 9;
+  static constexpr int kAccelBias = 12;
+  static constexpr int kEndcaps = 15;
+  static constexpr int kRates = 27;
+  static constexpr int kOffsets = 39;
+  static constexpr int kGround = 48;
+  static constexpr int Dim = 51;
+  // Columns of the group: v, p, q_2 .. q_5, w_2 .. w_5.
+  static constexpr int kColumns = 10;
+  static constexpr int column_index(int column) {
+    return column == 0 ? kVelocity : column == 1 ? kPosition : kEndcaps + 3 * (column - 2);
+  }
+
+  using Covariance = Matrix<Scalar, Dim>;
+  using ErrorVector = Vector<Scalar, Dim>;
+
+  explicit Belief(const Prism<Scalar>& robot) : base{robot.endcap0(), robot.endcap1()} {}
+
+  std::array<V3, 2> base;        // endcaps 0 and 1, body [m]
+  M3 rotation = M3::Identity();  // R
+  Matrix<Scalar, 3, kColumns> columns = Matrix<Scalar, 3, kColumns>::Zero();
+  V3 gyro_bias = V3::Zero();                              // b_g, body [rad/s]
+  V3 accel_bias = V3::Zero();                             // b_a, body [m/s^2]
+  Vector<Scalar, 9> offsets = Vector<Scalar, 9>::Zero();  // o, measured - true [m]
+  V3 ground = V3::Zero();                                 // m [m], [1], [1]
+  V3 rate = V3::Zero();                                   // angular, of the last step,
+                                                          // bias removed, body [rad/s]
+  Covariance covariance = Covariance::Zero();
+
+  auto velocity() const { return columns.col(0); }  // [m/s]
+  auto position() const { return columns.col(1); }  // [m]
+
+  // Centre and velocity of any endcap in the world [m], [m/s], and where their errors start. Those
+  // of the base rod move with the body: xi_q = xi_p, and xi_w = xi_v + R hat(b_i) zeta_g.
+  V3 endcap(int i) const {
+    return i < 2 ? V3(position() + rotation * base[std::size_t(i)]) : V3(columns.col(i));
+  }
+  V3 endcap_velocity(int i) const {
+    return i < 2 ? V3(velocity() + rotation * rate.cross(base[std::size_t(i)]))
+                 : V3(columns.col(i + 4));
+  }
+  static constexpr int endcap_index(int i) { return i < 2 ? kPosition : kEndcaps + 3 * (i - 2); }
+  static constexpr int endcap_velocity_index(int i) {
+    return i < 2 ? kVelocity : kRates + 3 * (i - 2);
+  }
+
+  Endcaps<Scalar> endcaps_world() const {
+    Endcaps<Scalar> q;
+    for (int i = 0; i < 6; ++i) q.col(i) = endcap(i);
+    return q;
+  }
+  Endcaps<Scalar> endcaps_body() const {
+    return rotation.transpose() * (endcaps_world().colwise() - V3(position()));
+  }
+  // Upward unit normal of the ground.
+  V3 ground_normal() const { return V3(-ground[1], -ground[2], 1).normalized(); }
+
+  // X <- Exp(-xi) X, theta <- theta - zeta: takes an estimated error out of the mean.
+  void retract(const ErrorVector& e) {
+    const Gamma<Scalar> gamma(-e.template segment<3>(kRotation));
+    for (int c = 0; c < kColumns; ++c) {
+      columns.col(c) =
+          (gamma.g0 * columns.col(c) - gamma.g1 * e.template segment<3>(column_index(c))).eval();
+    }
+    rotation = orthonormalized<Scalar>(gamma.g0 * rotation);
+    gyro_bias -= e.template segment<3>(kGyroBias);
+    rate += e.template segment<3>(kGyroBias);
+    accel_bias -= e.template segment<3>(kAccelBias);
+    offsets -= e.template segment<9>(kOffsets);
+    ground -= e.template segment<3>(kGround);
+  }
+
+  bool finite() const {
+    return rotation.allFinite() && columns.allFinite() && gyro_bias.allFinite() &&
+           accel_bias.allFinite() && offsets.allFinite() && ground.allFinite() &&
+           covariance.allFinite();
+  }
+
+  // Covariances of errors in the world frame: of a column x it is xi_x + xi_R x x.
+  M3 position_covariance() const { return column_covariance(position(), kPosition); }
+  M3 velocity_covariance() const { return column_covariance(velocity(), kVelocity); }
+  M3 rotation_covariance() const { return covariance.template block<3, 3>(kRotation, kRotation); }
+  // Joint covariance of the endcaps in the body frame [m^2], q stacked by endcap. An error of
+  // R' (q_i - p) is R' (xi_q - xi_p) up to the rotation, which leaves the body frame.
+  Matrix<Scalar, 18> endcap_covariance() const {
+    Matrix<Scalar, 18> out = Matrix<Scalar, 18>::Zero();
+    const M3 to_body = rotation.transpose();
+    const M3 pp = covariance.template block<3, 3>(kPosition, kPosition);
+    for (int i = 2; i < 6; ++i) {
+      for (int j = 2; j < 6; ++j) {
+        const int a = endcap_index(i), b = endcap_index(j);
+        const M3 relative = covariance.template block<3, 3>(a, b) -
+                            covariance.template block<3, 3>(a, kPosition) -
+                            covariance.template block<3, 3>(kPosition, b) + pp;
+        out.template block<3, 3>(3 * i, 3 * j) = to_body * relative * rotation;
+      }
+    }
+    return out;
+  }
+
+ private:
+  M3 column_covariance(const V3& column, int at) const {
+    const M3 c = hat(column);
+    const M3 cross = covariance.template block<3, 3>(at, kRotation) * c.transpose();
+    return covariance.template block<3, 3>(at, at) - cross - cross.transpose() +
+           c * rotation_covariance() * c.transpose();
+  }
+};
+
+}  // namespace tensegrity::tight

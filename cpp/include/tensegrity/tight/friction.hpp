@@ -1,0 +1,74 @@
+// Which of the feet on the ground stand still, decided by friction.
+//
+// The cables pull on all feet at once and their distances have to follow: of three feet on the
+// ground at most one can stand still, in general. Coulomb friction says which. With loads N_i and
+// slip velocities s_i the robot moves so that the dissipated power sum mu N_i |s_i| is least (the
+// principle of least dissipation, for motion that is slow against mu g: 0.01 s at walking speed).
+// That is a likelihood of the slips, given their differences from the shape:
+//
+//   p(s) ~ exp(- sum_i share_i |s_i| dt / b),   share_i = N_i / sum N the share of the load,
+//
+// with one length b, the path that a fully loaded foot slips between two independent decisions.
+// Feet that carry more slip less. The most probable velocity is the load-weighted geometric median
+// of the velocities that the single feet stand for: exactly on one foot if its load outweighs the
+// directed sum of the others', in between if none does. No foot is ever switched on or off.
+//
+// In the filter |s| is majorised at its predicted value (iteratively reweighted least squares): a
+// zero-velocity measurement with the variance
+//   (creep^2 + b |s| / share) / dt.
+// The majorant has the right gradient, but its curvature is false along s, where |s| is straight: a
+// sliding foot pulls, yet does not inform. So P is reduced along the slip only by the fraction
+//   v0 / (v0 + |s|),
+// and by the whole across it, where |s| truly curves. Three sliding feet then move the mean to the
+// balance of friction and leave it as uncertain as it is.
+#pragma once
+
+#include "tensegrity/tight/feet.hpp"
+
+namespace tensegrity::tight {
+
+template <typename Scalar>
+struct FootNoise {
+  Scalar creep;        // of a foot that stands still [m/sqrt(s)]
+  Scalar slip_length;  // b [m]
+  Scalar slip_speed;   // v0 [m/s]
+  Scalar rise;         // velocity across the ground [m/sqrt(s)]
+  Scalar height;       // above the plane [m sqrt(s)]
+};
+
+// Shares below this are taken as this much: the direction of a foot that is hardly loaded would
+// otherwise have no say even where it alone stands still [1].
+inline constexpr double kLeastShare = 0.1;
+
+// One foot on the ground for `dt` [s]. Returns the chi-square of its height (one degree of
+// freedom).
+//
+// How much a foot is believed to touch at all grows with the square of its share, up to a third:
+// the foot that is about to lift off carries little, and holding it down would bend the shape.
+template <typename Scalar>
+Scalar correct_foot(SequentialUpdate<Scalar>& update, const Belief<Scalar>& belief, int endcap,
+                    Scalar share, const Prism<Scalar>& robot, const FootNoise<Scalar>& noise,
+                    Scalar dt) {
+  using V3 = Vector3<Scalar>;
+  const V3 normal = belief.ground_normal();
+  const Foot<Scalar> foot(belief, endcap, robot.endcap_radius, robot.rod_length, normal);
+  const Scalar rise = normal.dot(foot.slip());
+  const V3 slip = foot.slip() - rise * normal;
+  const Scalar speed = slip.norm();
+  const V3 along = speed > Scalar(1e-6) ? V3(slip / speed) : normal.unitOrthogonal();
+
+  const Scalar friction = (noise.creep * noise.creep +
+                           noise.slip_length * speed / std::max(share, Scalar(kLeastShare))) /
+                          dt;
+  update.correct(foot.along(normal.cross(along)), Scalar(0), friction);
+  update.correct(foot.along(along), speed, friction, Scalar(0),
+                 noise.slip_speed / (noise.slip_speed + speed));
+
+  const Scalar belief_in_contact = std::min(std::max(3 * share, Scalar(0.005)), Scalar(1));
+  const Scalar trust = dt * belief_in_contact * belief_in_contact;
+  update.correct(foot.along(normal), rise, noise.rise * noise.rise / trust);
+  return update.correct(height_row(belief, endcap), height(belief, endcap, robot.endcap_radius),
+                        noise.height * noise.height / trust);
+}
+
+}  // namespace tensegrity::tight

@@ -1,0 +1,107 @@
+// What holds the robot together, as measurements: nine cables of measured length, two rods of known
+// length, and the side of the fold the shape is on.
+//
+// With right-invariant errors the distance of endcaps i and j moves by n . (xi_i - xi_j), n the
+// unit vector from j to i: no rotation, no position of the whole.
+#pragma once
+
+#include "tensegrity/shape/fold.hpp"
+#include "tensegrity/tight/sequential_update.hpp"
+
+namespace tensegrity::tight {
+
+template <typename Scalar>
+struct CableResult {
+  Scalar chi_square = 0;  // of the accepted cables
+  int accepted = 0;
+  int rejected = 0;
+};
+
+// `lengths`: distances of endcap centres [m], NaN for a cable without a measurement. A length whose
+// squared innovation exceeds `gate` times its variance is left out (0: never).
+template <typename Scalar>
+CableResult<Scalar> correct_cables(Belief<Scalar>& belief, const CableLengths<Scalar>& lengths,
+                                   Scalar std, Scalar gate) {
+  using B = Belief<Scalar>;
+  CableResult<Scalar> result;
+  SequentialUpdate<Scalar> update(belief);
+  for (int k = 0; k < 9; ++k) {
+    if (!std::isfinite(lengths[k])) continue;
+    const Cable cable = kPrismCables[std::size_t(k)];
+    const Vector3<Scalar> span = belief.endcap(cable.from) - belief.endcap(cable.to);
+    const Scalar length = span.norm();
+    if (!(length > 0)) continue;
+    Row<Scalar> row;
+    row.add(B::endcap_index(cable.from), span / length);
+    row.add(B::endcap_index(cable.to), -span / length);
+    row.add_single(B::kOffsets + k, Scalar(1));
+    const Scalar chi_square =
+        update.correct(row, length + belief.offsets[k] - lengths[k], std * std, gate);
+    if (gate > 0 && !(chi_square <= gate)) {
+      ++result.rejected;
+    } else {
+      result.chi_square += chi_square;
+      ++result.accepted;
+    }
+  }
+  return result;
+}
+
+// Rods 23 and 45 keep their length L, and therefore do not stretch: |q_a - q_b| = L and
+// n . (w_a - w_b) = 0. The standard deviations [m], [m/s] stand for what linearisation leaves out:
+// an error of direction of x metres at each end shortens the rod by 2 x^2 / L in second order.
+template <typename Scalar>
+void hold_rods(Belief<Scalar>& belief, Scalar rod_length, Scalar length_std, Scalar stretch_std) {
+  using B = Belief<Scalar>;
+  SequentialUpdate<Scalar> update(belief);
+  for (int a = 2; a < 6; a += 2) {
+    const int b = a + 1;
+    const Vector3<Scalar> span = belief.endcap(a) - belief.endcap(b);
+    const Scalar length = span.norm();
+    if (!(length > 0)) continue;
+    const Vector3<Scalar> n = span / length;
+    Row<Scalar> row;
+    row.add(B::endcap_index(a), n);
+    row.add(B::endcap_index(b), -n);
+    update.correct(row, length - rod_length, length_std * length_std);
+    const Vector3<Scalar> rate = belief.endcap_velocity(a) - belief.endcap_velocity(b);
+    const Scalar stretch = n.dot(rate);
+    const Vector3<Scalar> across = (rate - stretch * n) / length;
+    Row<Scalar> rigid;
+    rigid.add(B::endcap_velocity_index(a), n);
+    rigid.add(B::endcap_velocity_index(b), -n);
+    rigid.add(B::endcap_index(a), across);
+    rigid.add(B::endcap_index(b), -across);
+    update.correct(rigid, stretch, stretch_std * stretch_std);
+  }
+}
+
+// Soft one-sided prior on the side of the fold (shape/fold.hpp): two shapes fit nine lengths, and
+// the loaded robot is on the one of positive `fold` but for moments. Below `threshold` it is
+// measured to be there with the standard deviation `std`.
+template <typename Scalar>
+void hold_fold(Belief<Scalar>& belief, const Prism<Scalar>& robot, Scalar threshold, Scalar std) {
+  using B = Belief<Scalar>;
+  const shape::Rods<Scalar> rods(robot, belief.endcaps_body());
+  const Scalar fold = shape::fold(rods, robot.moment_sign());
+  if (!(fold < threshold)) return;
+  const shape::Tangent<Scalar> gradient = shape::fold_gradient(rods, robot.moment_sign());
+  Row<Scalar> row;
+  Vector3<Scalar> base = Vector3<Scalar>::Zero();
+  for (int i = 2; i < 6; ++i) {
+    // d tangent / d endcap: dc = (dq_a + dq_b)/2, L/2 du = across' (dq_a - dq_b)/2.
+    const int k = shape::free_rod(i);
+    const Vector3<Scalar> body =
+        gradient.template segment<3>(5 * k) / 2 +
+        Scalar(shape::rod_side(i)) / 2 *
+            (rods.rod(k).across() * gradient.template segment<2>(5 * k + 3));
+    const Vector3<Scalar> world = belief.rotation * body;
+    row.add(B::endcap_index(i), world);
+    base -= world;
+  }
+  row.add(B::kPosition, base);
+  SequentialUpdate<Scalar> update(belief);
+  update.correct(row, fold - threshold, std * std);
+}
+
+}  // namespace tensegrity::tight

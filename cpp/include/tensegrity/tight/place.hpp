@@ -1,0 +1,48 @@
+// Endcaps put where a shape says, with a fresh covariance: at the start and after losing them.
+#pragma once
+
+#include "tensegrity/tight/belief.hpp"
+
+namespace tensegrity::tight {
+
+// Replaces endcaps 2 .. 5 and their velocities by those of the rigid shape `h` (body [m]). Their
+// errors become those of the base rod plus, independent of everything else, `position_std` [m] of
+// each endcap, `spin_std` [rad] of the shape about the base rod, and `rate_std` [m/s].
+template <typename Scalar>
+void place_endcaps(Belief<Scalar>& belief, const Endcaps<Scalar>& h, Scalar position_std,
+                   Scalar spin_std, Scalar rate_std) {
+  using B = Belief<Scalar>;
+  using V3 = Vector3<Scalar>;
+  using M3 = Matrix3<Scalar>;
+  const M3& rotation = belief.rotation;
+  std::array<M3, 4> gyro_to;  // xi_w = xi_v + R hat(h) zeta_g
+  for (int i = 2; i < 6; ++i) {
+    belief.columns.col(i) = belief.position() + rotation * h.col(i);
+    belief.columns.col(i + 4) = belief.velocity() + rotation * belief.rate.cross(V3(h.col(i)));
+    gyro_to[std::size_t(i - 2)] = rotation * hat(h.col(i));
+  }
+  auto& p = belief.covariance;
+  // Rows of the endcaps from those of the base rod, then the same for their columns.
+  const auto derive = [&](auto&& m) {
+    for (int i = 2; i < 6; ++i) {
+      m.template middleRows<3>(B::endcap_index(i)) = m.template middleRows<3>(B::kPosition);
+      m.template middleRows<3>(B::endcap_velocity_index(i)) =
+          m.template middleRows<3>(B::kVelocity);
+      m.template middleRows<3>(B::endcap_velocity_index(i)) +=
+          gyro_to[std::size_t(i - 2)].lazyProduct(m.template middleRows<3>(B::kGyroBias));
+    }
+  };
+  derive(p);
+  derive(p.transpose());
+  for (int i = 2; i < 6; ++i) {
+    const V3 turn_i = spin_std * rotation * V3::UnitZ().cross(V3(h.col(i)));
+    for (int j = 2; j < 6; ++j) {
+      const V3 turn_j = spin_std * rotation * V3::UnitZ().cross(V3(h.col(j)));
+      p.template block<3, 3>(B::endcap_index(i), B::endcap_index(j)) += turn_i * turn_j.transpose();
+    }
+  }
+  p.diagonal().template segment<12>(B::kEndcaps).array() += position_std * position_std;
+  p.diagonal().template segment<12>(B::kRates).array() += rate_std * rate_std;
+}
+
+}  // namespace tensegrity::tight
