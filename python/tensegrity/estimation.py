@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 import tensegrity._core as _core
 from tensegrity.config import FilterConfig
 from tensegrity.errors import InputError
 from tensegrity.robots import Robot
 from tensegrity.robots import load as load_robot
+from tensegrity.robots.mounting import imu_rotation
 from tensegrity.sequence import Sequence
 from tensegrity.trajectory import Trajectory
 
@@ -35,6 +40,50 @@ class PrismEstimator(_core.PrismEstimator):
         config = config if isinstance(config, FilterConfig) else FilterConfig.load(config)
         tight = config.settings.filter == "tight"
         super().__init__(core_robot(robot), core_config(config), tight)
+        # None leaves samples as they are, also their type: most robots need no correction.
+        self._imu_rotation = (
+            imu_rotation(robot.imu_misalignment) if any(robot.imu_misalignment) else None
+        )
+        self._cable_offsets = np.array(robot.cable_offsets) if any(robot.cable_offsets) else None
+
+    def imu(self, t: int, gyro: ArrayLike, accel: ArrayLike) -> _core.Status:
+        """One IMU sample: t [ns], angular velocity (3,) [rad/s], specific force (3,) [m/s^2], in
+        the frame of the IMU, which the robot's ``imu_misalignment`` turns into the body frame."""
+        return super().imu(t, self._to_body(gyro), self._to_body(accel))
+
+    def cables(self, t: int, lengths: ArrayLike) -> _core.Status:
+        """Cable lengths: t [ns], (9,) [m] in the order of the robot's cables, NaN: not measured.
+        The robot's ``cable_offsets`` are taken off."""
+        return super().cables(t, self._without_offsets(lengths))
+
+    def replay(
+        self,
+        imu_t: ArrayLike,
+        gyro: ArrayLike,
+        accel: ArrayLike,
+        cables_t: ArrayLike,
+        lengths: ArrayLike,
+        contacts_t: ArrayLike | None = None,
+        flags: ArrayLike | None = None,
+        progress: Progress | None = None,
+    ) -> tuple[dict[str, Any], float]:
+        """Feeds a whole recording and returns (arrays by name, seconds in the estimator)."""
+        return super().replay(
+            imu_t,
+            self._to_body(gyro),
+            self._to_body(accel),
+            cables_t,
+            self._without_offsets(lengths),
+            contacts_t,
+            flags,
+            progress,
+        )
+
+    def _to_body(self, vectors: ArrayLike) -> ArrayLike:
+        return vectors if self._imu_rotation is None else np.dot(vectors, self._imu_rotation.T)
+
+    def _without_offsets(self, lengths: ArrayLike) -> ArrayLike:
+        return lengths if self._cable_offsets is None else np.subtract(lengths, self._cable_offsets)
 
 
 def estimate(

@@ -22,6 +22,10 @@ PRISM_CABLES = ((0, 4), (0, 2), (2, 4), (1, 5), (1, 3), (3, 5), (1, 4), (0, 3), 
 Endcap = Annotated[int, Field(ge=0)]
 Pair = Annotated[tuple[Endcap, Endcap], Field(strict=False)]
 
+# Beyond this what is small is no longer the rod's axis seen by an IMU that was mounted along it.
+_LARGEST_MISALIGNMENT = math.radians(20)
+SmallAngle = Annotated[float, Field(ge=-_LARGEST_MISALIGNMENT, le=_LARGEST_MISALIGNMENT)]
+
 
 class Cable(StrictModel):
     """A cable that pulls with ``stiffness * (length - rest_length) + damping * rate``, never
@@ -38,7 +42,9 @@ class Robot(StrictModel):
     """A 3-bar prism: three rods joined by nine cables (T §III-A).
 
     Body frame: that of the base IMU on rod (0, 1), z from endcap 1 to endcap 0, origin
-    ``imu_offset`` from the rod's centre toward endcap 0.
+    ``imu_offset`` from the rod's centre toward endcap 0. An IMU whose own z axis misses the rod's
+    is turned into the body frame by ``imu_misalignment``; ``cable_offsets`` are taken off the
+    measured lengths. ``tensegrity calibrate-robot`` finds all three from a recording.
     """
 
     name: str = field("name of the robot", min_length=1)
@@ -49,6 +55,9 @@ class Robot(StrictModel):
     rod_diameter: float = field("diameter of a rod", unit="m", gt=0)
     rod_mass: float = field("mass of a rod", unit="kg", gt=0)
     imu_offset: float = field("IMU from the centre of rod (0, 1) toward endcap 0", unit="m")
+    imu_misalignment: Annotated[tuple[SmallAngle, SmallAngle], Field(strict=False)] = field(
+        "turns about the body's x and y that take the body frame to the IMU's", unit="rad"
+    )
     endcap_radius: float = field("radius of the spherical endcaps", unit="m", ge=0)
     cable_attachment_offset: float = field(
         "distance of the cables' attachment points from the rod's axis", unit="m", ge=0
@@ -56,6 +65,9 @@ class Robot(StrictModel):
     rods: Annotated[tuple[Pair, ...], Field(strict=False)] = field("endcaps of each rod")
     cables: Annotated[tuple[Cable, ...], Field(strict=False)] = field(
         "cables in the order of T eq. 1; stiffness [N/m], damping [N s/m], rest_length [m]"
+    )
+    cable_offsets: Annotated[tuple[float, ...], Field(strict=False)] = field(
+        "constant errors of the measured lengths, in the order of the cables", unit="m"
     )
 
     @field_validator("rods")
@@ -71,6 +83,16 @@ class Robot(StrictModel):
         if tuple(cable.endcaps for cable in cables) != PRISM_CABLES:
             raise ValueError(f"expected the cables of the prism in order, {_listing(PRISM_CABLES)}")
         return cables
+
+    @model_validator(mode="after")
+    def _has_an_offset_for_every_cable(self) -> Robot:
+        if len(self.cable_offsets) != len(self.cables):
+            raise inconsistent(
+                f"expected {len(self.cables)} offsets [m], one per cable, "
+                f"got {len(self.cable_offsets)}",
+                "cable_offsets",
+            )
+        return self
 
     @model_validator(mode="after")
     def _can_be_built(self) -> Robot:

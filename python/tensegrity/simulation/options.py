@@ -64,6 +64,12 @@ class SimulationOptions(StrictModel):
         default="interval_mean",
     )
     rod_imus: bool = field("record IMUs on the other rods too", default=False)
+    imu_misalignment: Annotated[tuple[float, float], Field(strict=False)] = field(
+        "turns about the body's x and y that take the body frame to the base IMU's, beside those "
+        "the robot states",
+        unit="rad",
+        default=(0.0, 0.0),
+    )
     gyro_noise: float = field("standard deviation", unit="rad/s", default=0.002, ge=0)
     accel_noise: float = field("standard deviation", unit="m/s^2", default=0.043, ge=0)
     gyro_bias_walk: float = field(
@@ -74,7 +80,9 @@ class SimulationOptions(StrictModel):
     )
     cable_noise: float = field("standard deviation", unit="m", default=0.002, ge=0)
     cable_offsets: Annotated[tuple[float, ...], Field(strict=False)] | None = field(
-        "constant errors, one per cable; none: no errors", unit="m", default=None
+        "constant errors, one per cable, beside those the robot states; none: no errors",
+        unit="m",
+        default=None,
     )
     cable_offset_std: float = field(
         "standard deviation of further constant errors, drawn from the seed",

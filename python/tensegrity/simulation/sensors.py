@@ -59,14 +59,18 @@ def stamps(count: int, period_s: float) -> IntArray:
 
 
 def imu_stream(
-    motion: FrameMotion, options: SimulationOptions, rng: np.random.Generator
+    motion: FrameMotion,
+    options: SimulationOptions,
+    rng: np.random.Generator,
+    mounting: FloatArray,
 ) -> ImuStream:
-    """An IMU fixed to the frame of ``motion``.
+    """An IMU at the origin of the frame of ``motion``; ``mounting`` (3, 3) rotates from the IMU's
+    axes to that frame's.
 
     Row :data:`IMU_STEPS` of ``motion`` is time zero: the first sample covers what comes before.
     Biases start at zero and walk.
     """
-    gyro, accel = inertial_samples(motion, options)
+    gyro, accel = (values @ mounting for values in inertial_samples(motion, options))
     for values, noise, walk in (
         (gyro, options.gyro_noise, options.gyro_bias_walk),
         (accel, options.accel_noise, options.accel_bias_walk),
@@ -107,6 +111,7 @@ def cable_stream(
     sampled = endcaps[::CABLE_STEPS]
     pairs = np.array([cable.endcaps for cable in robot.cables])
     lengths = np.linalg.norm(sampled[:, pairs[:, 0]] - sampled[:, pairs[:, 1]], axis=2)
+    lengths += np.array(robot.cable_offsets)
     if options.cable_offsets is not None:
         lengths += np.array(options.cable_offsets)
     lengths += rng.normal(0.0, options.cable_noise, lengths.shape)

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from tensegrity.errors import InputError
 from tensegrity.robots import Robot, load
+from tensegrity.robots.mounting import imu_rotation
 from tensegrity.sequence.sequence import EndcapStream, PoseStream, Sequence
 from tensegrity.simulation.failures import lost_cable_index, with_gaps, without_lost_cable
 from tensegrity.simulation.gait import FACES, Gait
@@ -219,10 +220,12 @@ def _recording(
     frames = [
         rod.mounted(robot.imu_offset, turn) for rod, turn in zip(rods, imu_turns, strict=True)
     ]
-    base, *others = (
-        imu_stream(frame, options, imu_rng)
-        for frame in (frames if options.rod_imus else frames[:1])
-    )
+    misalignment = np.add(robot.imu_misalignment, options.imu_misalignment)
+    base = imu_stream(frames[0], options, imu_rng, imu_rotation(misalignment))
+    others = [
+        imu_stream(frame, options, imu_rng, np.eye(3))
+        for frame in (frames[1:] if options.rod_imus else [])
+    ]
     t_ns = base.t_ns
     end = IMU_STEPS * (len(t_ns) + 1)
     since_start = slice(IMU_STEPS, end)

@@ -85,17 +85,17 @@ struct PrismConfig {
   Scalar shape_std_rest = Scalar(0.01);        // shape at rest [m/sqrt(s)]
   Scalar shape_std_moving = Scalar(0.1);       // shape while rolling or falling [m/sqrt(s)]
   // the tightly coupled filter alone: endcaps (tight/propagate.hpp), feet (tight/friction.hpp)
-  Scalar endcap_acceleration_rest = Scalar(0.2);  // white, at rest [m/s/sqrt(s)]
-  Scalar endcap_acceleration_moving = Scalar(3);  // at full activity [m/s/sqrt(s)]
-  Scalar active_force = Scalar(4);                // deviation from gravity at full activity [m/s^2]
-  Scalar active_rate = Scalar(1);                 // rate at full activity [rad/s]
-  Scalar creep_std = Scalar(0.004);               // of a foot that stands still [m/sqrt(s)]
-  Scalar slip_length = Scalar(0.004);             // scale of friction's likelihood [m]
-  Scalar slip_speed = Scalar(0.02);               // above it a foot informs across its slip [m/s]
-  Scalar foot_rise_std = Scalar(0.01);            // speed off the ground [m/sqrt(s)]
-  Scalar foot_height_std = Scalar(0.0015);        // height above the ground [m sqrt(s)]
-  Scalar ground_height_walk = Scalar(0.005);      // terrain unknown, moving [m/sqrt(s)]
-  Scalar ground_slope_walk = Scalar(0.01);        // terrain unknown, moving [1/sqrt(s)]
+  Scalar endcap_acceleration_rest = Scalar(0.12);   // white, at rest [m/s/sqrt(s)]
+  Scalar endcap_acceleration_moving = Scalar(2.5);  // at full activity [m/s/sqrt(s)]
+  Scalar active_force = Scalar(4.3);          // deviation from gravity at full activity [m/s^2]
+  Scalar active_rate = Scalar(1.1);           // rate at full activity [rad/s]
+  Scalar creep_std = Scalar(0.009);           // of a foot that stands still [m/sqrt(s)]
+  Scalar slip_length = Scalar(0.006);         // scale of friction's likelihood [m]
+  Scalar slip_speed = Scalar(0.03);           // above it a foot informs across its slip [m/s]
+  Scalar foot_rise_std = Scalar(0.024);       // speed off the ground [m/sqrt(s)]
+  Scalar foot_height_std = Scalar(0.00125);   // height above the ground [m sqrt(s)]
+  Scalar ground_height_walk = Scalar(0.005);  // terrain unknown, moving [m/sqrt(s)]
+  Scalar ground_slope_walk = Scalar(0.01);    // terrain unknown, moving [1/sqrt(s)]
 };
 
 }  // namespace tensegrity

@@ -35,7 +35,8 @@ struct Belief {
   static constexpr int kRates = 27;
   static constexpr int kOffsets = 39;
   static constexpr int kGround = 48;
-  static constexpr int Dim = 51;
+  // 51 states, and one that is always zero: columns of P are then whole SIMD packets.
+  static constexpr int Dim = 52;
   // Columns of the group: v, p, q_2 .. q_5, w_2 .. w_5.
   static constexpr int kColumns = 10;
   static constexpr int column_index(int column) {

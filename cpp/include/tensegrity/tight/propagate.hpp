@@ -57,7 +57,10 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
 
   auto& p = belief.covariance;
   const auto add = [&](int to, int from, const M3& m) {
-    p.template middleCols<3>(to) += p.template middleCols<3>(from).lazyProduct(m.transpose());
+    for (int k = 0; k < 3; ++k) {
+      p.col(to + k) +=
+          m(k, 0) * p.col(from) + m(k, 1) * p.col(from + 1) + m(k, 2) * p.col(from + 2);
+    }
   };
   for (int side = 0; side < 2; ++side) {
     p.template middleCols<3>(B::kPosition) += dt * p.template middleCols<3>(B::kVelocity);
@@ -82,7 +85,9 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   for (int c = 0; c < B::kColumns; ++c) {
     l.template middleRows<3>(B::column_index(c)) = gyro * hat(x.col(c));
   }
-  p += l.lazyProduct(l.transpose());
+  for (int j = 0; j < B::kOffsets; ++j) {
+    p.col(j) += l(j, 0) * l.col(0) + l(j, 1) * l.col(1) + l(j, 2) * l.col(2);
+  }
   // Rounding made the triangles differ.
   p.template triangularView<Eigen::StrictlyUpper>() = p.transpose();
 

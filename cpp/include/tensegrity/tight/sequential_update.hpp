@@ -39,10 +39,16 @@ class Row {
   // P H'
   template <typename Covariance>
   Vector<Scalar, Covariance::RowsAtCompileTime> cross(const Covariance& p) const {
-    Vector<Scalar, Covariance::RowsAtCompileTime> c =
-        p.template middleCols<3>(at_[0]).lazyProduct(h_[0]);
-    for (int k = 1; k < blocks_; ++k) {
-      c += p.template middleCols<3>(at_[std::size_t(k)]).lazyProduct(h_[std::size_t(k)]);
+    Vector<Scalar, Covariance::RowsAtCompileTime> c;
+    for (int k = 0; k < blocks_; ++k) {
+      const int at = at_[std::size_t(k)];
+      const Vector3<Scalar>& h = h_[std::size_t(k)];
+      const auto term = h[0] * p.col(at) + h[1] * p.col(at + 1) + h[2] * p.col(at + 2);
+      if (k == 0) {
+        c = term;
+      } else {
+        c += term;
+      }
     }
     if (single_at_ >= 0) c += single_ * p.col(single_at_);
     return c;
@@ -65,13 +71,19 @@ class Row {
   Scalar single_ = 0;
 };
 
+// The downdates of P wait until the end as columns g of P - sum g g': P is then read and written
+// once for all rows instead of once for each.
 template <typename Scalar>
 class SequentialUpdate {
  public:
   using B = Belief<Scalar>;
 
   explicit SequentialUpdate(B& belief) : belief_(belief) {}
-  ~SequentialUpdate() { belief_.retract(error_); }
+  // Takes the collected error out of the mean.
+  ~SequentialUpdate() {
+    downdate();
+    belief_.retract(error_);
+  }
   SequentialUpdate(const SequentialUpdate&) = delete;
   SequentialUpdate& operator=(const SequentialUpdate&) = delete;
 
@@ -81,22 +93,43 @@ class SequentialUpdate {
   // moves more than the data inform (robust likelihoods, friction.hpp).
   Scalar correct(const Row<Scalar>& row, Scalar residual, Scalar variance, Scalar gate = 0,
                  Scalar information = 1) {
-    const typename B::ErrorVector cross = row.cross(belief_.covariance);
+    typename B::ErrorVector cross = row.cross(belief_.covariance);
+    for (int k = 0; k < waiting_; ++k) cross -= row.times(gains_.col(k)) * gains_.col(k);
     const Scalar s = std::max(row.times(cross), Scalar(0)) + variance;
     const Scalar y = residual - row.times(error_);
     const Scalar chi_square = y * y / s;
     if (!std::isfinite(chi_square) || (gate > 0 && chi_square > gate)) return chi_square;
-    error_ += cross * (y / s);
+    error_ += (y / s) * cross;
     if (information > 0) {
-      const typename B::ErrorVector g = cross * std::sqrt(information / s);
-      belief_.covariance -= g.lazyProduct(g.transpose());
+      if (waiting_ == kCapacity) downdate();
+      gains_.col(waiting_++) = std::sqrt(information / s) * cross;
     }
     return chi_square;
   }
 
  private:
+  static constexpr int kCapacity = 12;  // of three feet, and of nine cables
+
+  void downdate() {
+    auto& p = belief_.covariance;
+    const auto& g = gains_;
+    int k = 0;
+    for (; k + 4 <= waiting_; k += 4) {
+      for (int j = 0; j < B::Dim; ++j) {
+        p.col(j) -= g(j, k) * g.col(k) + g(j, k + 1) * g.col(k + 1) + g(j, k + 2) * g.col(k + 2) +
+                    g(j, k + 3) * g.col(k + 3);
+      }
+    }
+    for (; k < waiting_; ++k) {
+      for (int j = 0; j < B::Dim; ++j) p.col(j) -= g(j, k) * g.col(k);
+    }
+    waiting_ = 0;
+  }
+
   B& belief_;
   typename B::ErrorVector error_ = B::ErrorVector::Zero();
+  Matrix<Scalar, B::Dim, kCapacity> gains_;
+  int waiting_ = 0;
 };
 
 }  // namespace tensegrity::tight
