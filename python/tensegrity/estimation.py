@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsIndex, SupportsInt
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,12 +46,14 @@ class PrismEstimator(_core.PrismEstimator):
         )
         self._cable_offsets = np.array(robot.cable_offsets) if any(robot.cable_offsets) else None
 
-    def imu(self, t: int, gyro: ArrayLike, accel: ArrayLike) -> _core.Status:
+    def imu(
+        self, t: SupportsInt | SupportsIndex, gyro: ArrayLike, accel: ArrayLike
+    ) -> _core.Status:
         """One IMU sample: t [ns], angular velocity (3,) [rad/s], specific force (3,) [m/s^2], in
         the frame of the IMU, which the robot's ``imu_misalignment`` turns into the body frame."""
         return super().imu(t, self._to_body(gyro), self._to_body(accel))
 
-    def cables(self, t: int, lengths: ArrayLike) -> _core.Status:
+    def cables(self, t: SupportsInt | SupportsIndex, lengths: ArrayLike) -> _core.Status:
         """Cable lengths: t [ns], (9,) [m] in the order of the robot's cables, NaN: not measured.
         The robot's ``cable_offsets`` are taken off."""
         return super().cables(t, self._without_offsets(lengths))
