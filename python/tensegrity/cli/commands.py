@@ -27,7 +27,12 @@ COMMANDS = {
         "Print runs side by side.",
         "compare runs/right-paper runs/right-full --figures figures",
     ),
+    "calibrate-robot": Summary(
+        "Find cable offsets and IMU mounting from slow recordings.",
+        "calibrate-robot recordings/slow --out robot.yaml",
+    ),
     "config": Summary("Print a filter configuration.", "config paper > my.yaml"),
     "version": Summary("Print the version.", "version"),
 }
-"""Command NAME is the function NAME in the module ``tensegrity.cli.NAME``."""
+"""Command NAME is the function NAME in the module ``tensegrity.cli.NAME``, with underscores for
+hyphens."""

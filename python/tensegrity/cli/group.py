@@ -30,7 +30,8 @@ class CommandGroup(TyperGroup):
         summary = COMMANDS.get(cmd_name)
         if summary is None:
             ctx.fail(f"no command '{cmd_name}', {did_you_mean(cmd_name, COMMANDS)}")
-        function = getattr(import_module(f"tensegrity.cli.{cmd_name}"), cmd_name)
+        name = cmd_name.replace("-", "_")
+        function = getattr(import_module(f"tensegrity.cli.{name}"), name)
         single = typer.Typer(add_completion=False, rich_markup_mode=None)
         single.command(cmd_name, epilog=f"Example: tensegrity {summary.example}")(function)
         return typer.main.get_command(single)

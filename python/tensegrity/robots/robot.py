@@ -22,9 +22,10 @@ PRISM_CABLES = ((0, 4), (0, 2), (2, 4), (1, 5), (1, 3), (3, 5), (1, 4), (0, 3), 
 Endcap = Annotated[int, Field(ge=0)]
 Pair = Annotated[tuple[Endcap, Endcap], Field(strict=False)]
 
-# Beyond this what is small is no longer the rod's axis seen by an IMU that was mounted along it.
-_LARGEST_MISALIGNMENT = math.radians(20)
-SmallAngle = Annotated[float, Field(ge=-_LARGEST_MISALIGNMENT, le=_LARGEST_MISALIGNMENT)]
+LARGEST_MISALIGNMENT = math.radians(20)
+"""An IMU that was mounted along the rod is off by less; more is another choice of axes [rad]."""
+
+SmallAngle = Annotated[float, Field(ge=-LARGEST_MISALIGNMENT, le=LARGEST_MISALIGNMENT)]
 
 
 class Cable(StrictModel):
