@@ -101,10 +101,13 @@ class Detector {
     Probabilities result;
     for (std::size_t rank = 0; rank < order.size(); ++rank) {
       const Scalar height = (world(2, order[rank]) - lowest) / rod_length_;
-      result[std::size_t(order[rank])] =
+      const Scalar odds =
           parameters_.intercept[std::min<std::size_t>(rank, 2)] +
           parameters_.height_weight * height +
           parameters_.share_weight * (rank < 3 ? bounded(share[Eigen::Index(rank)]) : kLeastShare);
+      result[std::size_t(order[rank])] = odds < -kSurest  ? -kSurest
+                                         : odds > kSurest ? kSurest
+                                                          : odds;  // NaN stays
     }
     return result;
   }
@@ -115,6 +118,10 @@ class Detector {
   static Scalar bounded(Scalar share) {
     return share < kLeastShare ? kLeastShare : share > kGreatestShare ? kGreatestShare : share;
   }
+
+  // The geometry is an estimate, and may be that of another robot altogether when the estimator has
+  // lost this one: sensors have to be able to outvote it.
+  static constexpr Scalar kSurest = Scalar(4);
 
   Scalar stationary() const {
     return parameters_.touch_down_rate / (parameters_.touch_down_rate + parameters_.lift_off_rate);

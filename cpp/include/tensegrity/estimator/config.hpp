@@ -57,6 +57,7 @@ struct PrismConfig {
   Scalar gravity = Scalar(9.81);            // [m/s^2]
   // the tightly coupled filter
   Terrain terrain = Terrain::kFlat;
+  Scalar friction = Scalar(0.7);       // coefficient of the ground, matters on slopes alone
   Scalar contact_error = Scalar(0.1);  // share of contact flags that are wrong
   Scalar cable_gate = Scalar(6);       // cables: innovations beyond so many sigmas are left out
 

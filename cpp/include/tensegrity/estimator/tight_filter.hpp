@@ -79,6 +79,8 @@ class TightFilter {
       tight::hold_fold(belief_, robot_, kFoldThreshold, kFoldStd);
     }
     health.cables_rejected += std::uint32_t(result.rejected);
+    cables_lost_ = result.rejected > result.accepted ? cables_lost_ + 1 : 0;
+    if (lengths.allFinite()) last_lengths_ = lengths;
     if (result.accepted > 0) cable_nis_ = result.chi_square / Scalar(result.accepted);
     return result.accepted > 0 ? Status::kOk : Status::kRejected;
   }
@@ -89,12 +91,13 @@ class TightFilter {
   }
 
   // The feet, once all measurements of the step are in.
-  void end_step(Scalar dt, PrismHealth&) {
+  void end_step(Scalar dt, PrismHealth& health) {
     const Endcaps<Scalar> world = belief_.endcaps_world();
     loaded_ = detector_.update(world, dt);
     if (flags_are_new_) loaded_ = detector_.measure(flags_, flag_odds_);
     flags_are_new_ = false;
     correct_feet(world, dt);
+    watch(dt, health);
   }
 
   // ---- start, and what has to be given up
@@ -127,13 +130,12 @@ class TightFilter {
     p.diagonal()
         .template segment<9>(Belief::kOffsets)
         .setConstant(square(config_.cable_offset_std));
-    if (config_.terrain != Terrain::kFlat) {
-      p.diagonal()
-          .template segment<2>(Belief::kGround + 1)
-          .setConstant(square(config_.ground_slope_std));
-    }
+    const bool flat = config_.terrain == Terrain::kFlat;
+    p.diagonal()
+        .template segment<2>(Belief::kGround + 1)
+        .setConstant(square(flat ? kFlatSlopeStd : config_.ground_slope_std));
 
-    const SpinStart<Scalar> spin = stand(solver_.endcaps());
+    const SpinStart<Scalar> spin = stand(solver_.endcaps(), flags_);
     const Endcaps<Scalar> h = spun(solver_.endcaps(), spin.angle);
     belief_.columns(2, 1) = robot_.endcap_radius - (belief_.rotation * h).row(2).minCoeff();
     tight::place_endcaps(belief_, h, kStartShapeStd, std::sqrt(spin.variance),
@@ -153,6 +155,7 @@ class TightFilter {
     }
     tight::hold_rods(belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
     detector_.reset();
+    last_lengths_ = rest.lengths;
     return true;
   }
 
@@ -212,23 +215,78 @@ class TightFilter {
   void correct_feet(const Endcaps<Scalar>& world, Scalar dt) {
     const std::array<Scalar, 6> shares =
         contact::support_shares(world, loaded_, Scalar(kLeastLoad));
-    const tight::FootNoise<Scalar> noise{config_.creep_std, config_.slip_length, config_.slip_speed,
-                                         config_.foot_rise_std, config_.foot_height_std};
+    const tight::FootNoise<Scalar> noise{config_.creep_std,       config_.slip_length,
+                                         config_.slip_speed,      config_.foot_rise_std,
+                                         config_.foot_height_std, config_.friction};
+    worst_height_ = 0;
+    slowest_foot_ = std::numeric_limits<Scalar>::max();
     tight::SequentialUpdate<Scalar> update(belief_);
     Scalar chi_square = 0, feet = 0;
     for (int endcap = 0; endcap < 6; ++endcap) {
       const Scalar share = shares[std::size_t(endcap)];
       if (!(share > 0)) continue;
-      chi_square += tight::correct_foot(update, belief_, endcap, share, robot_, noise, dt);
+      const auto foot = tight::correct_foot(update, belief_, endcap, share, robot_, noise, dt);
+      chi_square += foot.height_chi_square;
       feet += 1;
+      if (share > kWatchedShare) worst_height_ = std::max(worst_height_, std::abs(foot.height));
+      slowest_foot_ = std::min(slowest_foot_, foot.speed);
     }
     if (feet > 0) ground_nis_ = chi_square / feet;
   }
 
+  // ---- losing lock: what cannot be true of a robot on its feet, for too long
+  //
+  //  - a loaded foot away from the ground, or most cables beyond their gate: the shape is another
+  //  one
+  //    (the wrong side of the fold, a wrong spin). The endcaps are placed anew from cables and
+  //    feet.
+  //  - ground that was declared flat, but tilts by five times what floors are allowed to. From then
+  //    on it is a plane of unknown slope.
+  //  - every foot slides fast although nothing shakes the robot: the velocity is wrong (a fall can
+  //    leave it so, and sure of itself). It is widened.
+  void watch(Scalar dt, PrismHealth& health) {
+    off_ground_ =
+        worst_height_ > kLostHeight ? off_ground_ + dt : std::max(off_ground_ - dt, Scalar(0));
+    if (off_ground_ > kLostTime || cables_lost_ >= kLostSamples) {
+      off_ground_ = 0;
+      cables_lost_ = 0;
+      place_anew();
+      ++health.shape_resets;
+    }
+    if (config_.terrain == Terrain::kFlat && !terrain_opened_ &&
+        belief_.ground.template tail<2>().norm() > kSlopeNoticed) {
+      terrain_opened_ = true;
+      belief_.covariance.diagonal().template segment<2>(Belief::kGround + 1).array() +=
+          square(config_.ground_slope_std);
+      ++health.terrain_mismatches;
+    }
+    const bool sliding = slowest_foot_ < std::numeric_limits<Scalar>::max() &&
+                         slowest_foot_ > kImpossibleSlip && activity_.level() < Scalar(0.5);
+    sliding_ = sliding ? sliding_ + dt : Scalar(0);
+    if (sliding_ > kLostTime) {
+      sliding_ = 0;
+      tight::widen_velocity(belief_, kImpossibleSlip);
+      ++health.velocity_resets;
+    }
+  }
+
+  void place_anew() {
+    Endcaps<Scalar> h = belief_.endcaps_body();
+    Scalar spin_variance = square(kLostSpinStd);
+    solver_.reset();
+    if (used(solver_.solve(last_lengths_ - belief_.offsets))) {
+      const SpinStart<Scalar> spin = stand(solver_.endcaps(), loaded_);
+      h = spun(solver_.endcaps(), spin.angle);
+      if (spin.found) spin_variance = spin.variance;
+    }
+    tight::place_endcaps(belief_, h, kPlacedShapeStd, std::sqrt(spin_variance), kPlacedRateStd);
+    tight::hold_rods(belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
+  }
+
   // phi from the endcaps that are on the ground. The ground may slope.
-  SpinStart<Scalar> stand(const Endcaps<Scalar>& q) const {
+  SpinStart<Scalar> stand(const Endcaps<Scalar>& q, const Flags& feet) const {
     const Scalar slope = config_.terrain == Terrain::kFlat ? Scalar(0) : config_.ground_slope_std;
-    SpinStart<Scalar> spin = find_spin(q, V3(belief_.rotation.transpose() * V3::UnitZ()), flags_,
+    SpinStart<Scalar> spin = find_spin(q, V3(belief_.rotation.transpose() * V3::UnitZ()), feet,
                                        std::hypot(kStartShapeStd, slope * robot_.rod_length / 2));
     if (!spin.found) spin.variance = square(config_.spin_prior_std);
     return spin;
@@ -237,6 +295,19 @@ class TightFilter {
   // Endcaps at rest from averaged lengths near the fold, and the height of the lowest [m].
   static constexpr Scalar kStartShapeStd = Scalar(0.02);
   static constexpr Scalar kStartHeightStd = Scalar(0.03);
+  // A foot this far off the ground [m], or feet that all slide this fast [m/s], for so long [s], is
+  // a lost robot; feet with less than this share of the weight say nothing about it.
+  static constexpr Scalar kLostHeight = Scalar(0.06);
+  static constexpr Scalar kImpossibleSlip = Scalar(0.5);
+  static constexpr Scalar kLostTime = Scalar(0.3);
+  static constexpr Scalar kWatchedShare = Scalar(0.15);
+  static constexpr int kLostSamples = 10;  // in a row with most cables rejected
+  // Level floors: 10 mm over 4 m is the tolerance of DIN 18202.
+  static constexpr Scalar kFlatSlopeStd = Scalar(0.0025);
+  static constexpr Scalar kSlopeNoticed = Scalar(5) * kFlatSlopeStd;
+  // Endcaps placed anew in motion [m], [m/s].
+  static constexpr Scalar kPlacedShapeStd = Scalar(0.05);
+  static constexpr Scalar kPlacedRateStd = Scalar(0.5);
   // After a long gap [m], [rad].
   static constexpr Scalar kLostShapeStd = Scalar(0.3);
   static constexpr Scalar kLostSpinStd = Scalar(1);
@@ -261,6 +332,11 @@ class TightFilter {
   Flags flags_{}, loaded_{};
   bool flags_are_new_ = false;
   int cable_samples_ = 0;
+  CableLengths<Scalar> last_lengths_ = CableLengths<Scalar>::Zero();
+  Scalar worst_height_ = 0, slowest_foot_ = 0;  // of the last step [m], [m/s]
+  Scalar off_ground_ = 0, sliding_ = 0;         // for how long [s]
+  int cables_lost_ = 0;                         // samples in a row
+  bool terrain_opened_ = false;
   Scalar cable_nis_ = std::numeric_limits<Scalar>::quiet_NaN();
   Scalar ground_nis_ = std::numeric_limits<Scalar>::quiet_NaN();
 };

@@ -13,6 +13,10 @@
 // of the velocities that the single feet stand for: exactly on one foot if its load outweighs the
 // directed sum of the others', in between if none does. No foot is ever switched on or off.
 //
+// On a slope the ground has to carry the weight's part along it as well: with t = g_t / (mu g_n),
+// the gravity along the plane over the greatest friction, sum share_i s_i / |s_i| = t, which adds
+// - share_i t . s_i to the exponents. Only here the coefficient mu of friction matters.
+//
 // In the filter |s| is majorised at its predicted value (iteratively reweighted least squares): a
 // zero-velocity measurement with the variance
 //   (creep^2 + b |s| / share) / dt.
@@ -34,21 +38,29 @@ struct FootNoise {
   Scalar slip_speed;   // v0 [m/s]
   Scalar rise;         // velocity across the ground [m/sqrt(s)]
   Scalar height;       // above the plane [m sqrt(s)]
+  Scalar friction;     // mu, coefficient of friction [1]
 };
 
 // Shares below this are taken as this much: the direction of a foot that is hardly loaded would
 // otherwise have no say even where it alone stands still [1].
 inline constexpr double kLeastShare = 0.1;
 
-// One foot on the ground for `dt` [s]. Returns the chi-square of its height (one degree of
-// freedom).
+// What a foot said before it corrected.
+template <typename Scalar>
+struct FootResult {
+  Scalar speed;              // of its slip [m/s]
+  Scalar height;             // above the ground [m]
+  Scalar height_chi_square;  // one degree of freedom
+};
+
+// One foot on the ground for `dt` [s].
 //
 // How much a foot is believed to touch at all grows with the square of its share, up to a third:
 // the foot that is about to lift off carries little, and holding it down would bend the shape.
 template <typename Scalar>
-Scalar correct_foot(SequentialUpdate<Scalar>& update, const Belief<Scalar>& belief, int endcap,
-                    Scalar share, const Prism<Scalar>& robot, const FootNoise<Scalar>& noise,
-                    Scalar dt) {
+FootResult<Scalar> correct_foot(SequentialUpdate<Scalar>& update, const Belief<Scalar>& belief,
+                                int endcap, Scalar share, const Prism<Scalar>& robot,
+                                const FootNoise<Scalar>& noise, Scalar dt) {
   using V3 = Vector3<Scalar>;
   const V3 normal = belief.ground_normal();
   const Foot<Scalar> foot(belief, endcap, robot.endcap_radius, robot.rod_length, normal);
@@ -57,18 +69,22 @@ Scalar correct_foot(SequentialUpdate<Scalar>& update, const Belief<Scalar>& beli
   const Scalar speed = slip.norm();
   const V3 along = speed > Scalar(1e-6) ? V3(slip / speed) : normal.unitOrthogonal();
 
-  const Scalar friction = (noise.creep * noise.creep +
+  const Scalar variance = (noise.creep * noise.creep +
                            noise.slip_length * speed / std::max(share, Scalar(kLeastShare))) /
                           dt;
-  update.correct(foot.along(normal.cross(along)), Scalar(0), friction);
-  update.correct(foot.along(along), speed, friction, Scalar(0),
+  const V3 across = normal.cross(along);
+  const V3 downhill = (normal * normal.z() - V3::UnitZ()) / (noise.friction * normal.z());
+  update.correct(foot.along(across), -speed * downhill.dot(across), variance);
+  update.correct(foot.along(along), speed * (1 - downhill.dot(along)), variance, Scalar(0),
                  noise.slip_speed / (noise.slip_speed + speed));
 
   const Scalar belief_in_contact = std::min(std::max(3 * share, Scalar(0.005)), Scalar(1));
   const Scalar trust = dt * belief_in_contact * belief_in_contact;
   update.correct(foot.along(normal), rise, noise.rise * noise.rise / trust);
-  return update.correct(height_row(belief, endcap), height(belief, endcap, robot.endcap_radius),
-                        noise.height * noise.height / trust);
+  const Scalar above = height(belief, endcap, robot.endcap_radius);
+  const Scalar chi_square =
+      update.correct(height_row(belief, endcap), above, noise.height * noise.height / trust);
+  return {speed, above, chi_square};
 }
 
 }  // namespace tensegrity::tight

@@ -1,4 +1,5 @@
-// Endcaps put where a shape says, with a fresh covariance: at the start and after losing them.
+// Fresh uncertainty: endcaps put where a shape says, at the start and after losing them, and a
+// velocity that is not believed any more.
 #pragma once
 
 #include "tensegrity/tight/belief.hpp"
@@ -43,6 +44,19 @@ void place_endcaps(Belief<Scalar>& belief, const Endcaps<Scalar>& h, Scalar posi
   }
   p.diagonal().template segment<12>(B::kEndcaps).array() += position_std * position_std;
   p.diagonal().template segment<12>(B::kRates).array() += rate_std * rate_std;
+}
+
+// Adds an independent velocity of the whole robot, of `std` [m/s] per axis, to what is unknown.
+template <typename Scalar>
+void widen_velocity(Belief<Scalar>& belief, Scalar std) {
+  using B = Belief<Scalar>;
+  constexpr std::array<int, 5> kMoving = {B::kVelocity, B::kRates, B::kRates + 3, B::kRates + 6,
+                                          B::kRates + 9};
+  for (const int i : kMoving) {
+    for (const int j : kMoving) {
+      belief.covariance.template block<3, 3>(i, j).diagonal().array() += std * std;
+    }
+  }
 }
 
 }  // namespace tensegrity::tight
