@@ -125,9 +125,10 @@ TEST_CASE("fold: corrects like an update with a differenced row, and only below 
       Samples samples(seed);
       const B prior = samples.belief(robot);
       const double value = fold(prior)[0], threshold = value + 0.1, std = 0.2;
-      const B expected =
-          dense_update(prior, derivative(prior, fold), VectorXd::Constant(1, value - threshold),
-                       VectorXd::Constant(1, std * std));
+      const MatrixXd h = derivative(prior, fold);
+      CHECK(h.middleCols<3>(B::kRotation).norm() < kDerivativeError);  // a shape has no heading
+      const B expected = dense_update(prior, h, VectorXd::Constant(1, value - threshold),
+                                      VectorXd::Constant(1, std * std));
       B below = prior;
       tensegrity::tight::hold_fold(below, robot, threshold, std);
       check_same(below, expected);

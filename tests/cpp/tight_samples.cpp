@@ -106,6 +106,11 @@ MatrixXd sandwich(const MatrixXd& f, const MatrixXd& p, const MatrixXd& q) {
   return f * p * f.transpose() + q;
 }
 
+MatrixXd information(const B& belief) {
+  const MatrixXd p = belief.covariance.topLeftCorner<kStates, kStates>();
+  return Eigen::LLT<MatrixXd>(p).solve(MatrixXd::Identity(kStates, kStates));
+}
+
 double distance(const MatrixXd& a, const MatrixXd& b) {
   return (a - b).cwiseAbs().maxCoeff() / b.diagonal().maxCoeff();
 }

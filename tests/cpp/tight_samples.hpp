@@ -58,6 +58,9 @@ B dense_update(const B& belief, const MatrixXd& h, const VectorXd& z, const Vect
 // F P F' + Q.
 MatrixXd sandwich(const MatrixXd& f, const MatrixXd& p, const MatrixXd& q);
 
+// P^-1 of the states [kStates x kStates].
+MatrixXd information(const B& belief);
+
 // Largest difference of two covariances, relative to the largest variance of the second.
 double distance(const MatrixXd& a, const MatrixXd& b);
 
