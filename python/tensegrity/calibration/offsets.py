@@ -3,7 +3,8 @@
 For a linear filter with the prior N(m, s^2 I) of the offsets, the posterior mean moves by
 C / s^2 times what the prior mean moves: C is the posterior covariance. Replaying a recording with
 the mean moved by each cable in turn gives C column by column. What the recording says nothing about
-follows the prior entirely, and keeps its standard deviation s.
+follows the prior entirely, and keeps its standard deviation s. The filter's noises are not exact:
+its C is enlarged by the factor by which it is too sure of the mounting.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ from tensegrity.calibration.mounting import Mounting
 
 FloatArray = NDArray[np.float64]
 
-# Feet sink into the ground by parts of a millimetre that differ with their load, and rods are known
-# to about as much: no offset is known better, however long the recording.
-_LEAST_STD_M = 0.0005
+# Feet sink into the ground by some millimetres that differ with their load, and rods are not known
+# exactly either: no offset is known better, however long the recording.
+_LEAST_STD_M = 0.001
 
 
 @dataclass(frozen=True)
@@ -51,11 +52,10 @@ def find_offsets(
         information += own - prior
         weighted += own @ (offsets - expected)
         slopes += own @ offset_slopes
-    covariance = np.linalg.inv(information)
-    to_offsets = covariance @ slopes
+    joint = np.linalg.inv(information)
+    to_offsets = joint @ slopes
     return Offsets(
-        expected + covariance @ weighted,
-        covariance + to_offsets @ mounting.covariance @ to_offsets.T,
+        expected + joint @ weighted, joint + to_offsets @ mounting.covariance @ to_offsets.T
     )
 
 
@@ -80,5 +80,6 @@ def _posterior(
     )
     # Symmetric, between "known" and "not observed at all", but for the filter's nonlinearity.
     values, vectors = np.linalg.eigh((response + response.T) / 2)
-    variances = np.clip(values * expected_std**2, _LEAST_STD_M**2, expected_std**2)
+    variances = mounting.variance_factor * values * expected_std**2
+    variances = np.clip(variances, _LEAST_STD_M**2, expected_std**2)
     return middle, (vectors * variances) @ vectors.T
