@@ -11,6 +11,7 @@ import typer
 from tensegrity import estimation, robots
 from tensegrity.cli.console import err, out, progress_bar
 from tensegrity.cli.evaluate import evaluate_run
+from tensegrity.cli.events import report_events
 from tensegrity.cli.output import check_output
 from tensegrity.config import FilterConfig
 from tensegrity.errors import InputError, MissingExtraError
@@ -68,6 +69,7 @@ def estimate(
         config=filter_config,
         overwrite=overwrite,
     )
+    report_events(trajectory)
     out.print(f"run: {directory}", markup=False)
     if recording.groundtruth is None:
         return
