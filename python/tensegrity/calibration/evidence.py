@@ -24,6 +24,10 @@ BLOCK_S = 5.0
 """Innovations of one block add up [s]: about a step of a slow robot, after which they are as good
 as independent."""
 
+# Squared innovations of one sample count in full while they are well below this, and by their
+# logarithm above (Cauchy's loss): a filter that has lost the robot for a moment says nothing.
+_OUTLIER = 50.0
+
 _READING_S = 3.0  # at the end of the recording, where the offsets are read
 
 
@@ -31,7 +35,7 @@ _READING_S = 3.0  # at the end of the recording, where the offsets are read
 class Evidence:
     """One recording replayed through the filter.
 
-    * ``misfit`` (blocks,) sums of squared normalised innovations of cables and ground over
+    * ``misfit`` (blocks,) robust sums of squared normalised innovations of cables and ground over
       :data:`BLOCK_S` each: minus twice the logarithm of the recording's likelihood, up to a
       constant
     * ``offsets`` (9,) the filter's cable offsets at the end of the recording [m]
@@ -71,6 +75,7 @@ class Recording:
         measured[rows[rows >= 0]] = np.isfinite(self.sequence.cables.lengths[rows >= 0]).sum(axis=1)
         misfit = np.nan_to_num(trajectory.cable_nis) * measured
         misfit += np.nan_to_num(trajectory.ground_nis) * trajectory.contacts.sum(axis=1)
+        misfit = _OUTLIER * np.log1p(misfit / _OUTLIER)
         seconds = (trajectory.t_ns - trajectory.t_ns[0]) * 1e-9
         return np.bincount((seconds / BLOCK_S).astype(np.int64), misfit).astype(np.float64)
 

@@ -30,7 +30,7 @@ _CONVERGED = 1.0  # of a standard deviation: what is left after such a step is f
 _MODEL_STD = np.array([0.003, 0.0, 0.0])
 _ROUNDS = 8
 _LONGEST_STEP = 0.03  # [m], [rad]: as far as the quadratic is believed
-_HALVINGS = 4
+_DAMPINGS = (0.0, 0.1, 1.0, 10.0, 100.0)  # of the mean curvature (Levenberg)
 ROUND_REPLAYS = 2 + 2 * len(MOUNTING) + len(MOUNTING)
 
 
@@ -87,16 +87,18 @@ def find_mounting(
         blocks = len(spread)
         scatter = 4 * prior + spread.T @ spread * blocks / max(blocks - len(MOUNTING), 1)
         covariance = inverse @ scatter @ inverse
-        step = -inverse @ (slopes.sum(axis=0) + 2 * prior @ (centre - start))
-        step *= min(1.0, _LONGEST_STEP / float(np.abs(step).max()))
+        slope = slopes.sum(axis=0) + 2 * prior @ (centre - start)
         found = None
-        for halving in range(_HALVINGS):
-            there = centre + step / 2**halving
-            there_misfit = misfit(there)
+        for damping in _DAMPINGS:
+            damped = curvature + damping * np.trace(curvature) / 3 * np.eye(3)
+            step = -np.linalg.solve(damped, slope)
+            if np.abs(step).max() > _LONGEST_STEP:
+                continue
+            there_misfit = misfit(centre + step)
             if there_misfit < lowest:
-                found, lowest = there, there_misfit
+                found, lowest = centre + step, there_misfit
                 break
-        small = np.all(np.abs(step) < _CONVERGED * np.sqrt(np.diag(covariance)))
+        small = np.all(np.abs(inverse @ slope) < _CONVERGED * np.sqrt(np.diag(covariance)))
         if found is None or small:
             return Mounting(
                 centre if found is None else found,
