@@ -5,7 +5,7 @@
 
 int main() {
   tensegrity::Prism<double> robot;         // the 3-bar prism of T; set its lengths to yours
-  tensegrity::PrismConfig<double> config;  // T's method; every number can be changed
+  tensegrity::PrismConfig<double> config;  // every number can be changed
   tensegrity::PrismEstimator<double> estimator(robot, config);
 
   const auto endcaps = robot.undeformed();
