@@ -48,7 +48,7 @@ format: setup ## format all code
 stubs: setup ## write python/tensegrity/_core.pyi from the built module
 	$(BIN)/python bindings/make_stubs.py python/tensegrity/_core.pyi
 
-bench: setup ## microbenchmarks
+bench: setup ## microbenchmarks (benchmarks/imu_cycle.cpp: those of C++ alone)
 	$(BIN)/python benchmarks/estimator.py
 
 clean: ## remove builds and the virtual environment

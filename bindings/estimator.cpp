@@ -39,6 +39,9 @@ class Estimator {
   Status cables(Nanoseconds t, const CableLengths<double>& lengths) {
     return visit([&](auto& e) { return e.cables(t, lengths); });
   }
+  Status rod_imu(Nanoseconds t, int rod, const V3& gyro, const V3& accel) {
+    return visit([&](auto& e) { return e.rod_imu(t, rod, gyro, accel); });
+  }
   Status contacts(Nanoseconds t, const std::array<bool, 6>& flags) {
     return visit([&](auto& e) { return e.contacts(t, flags); });
   }
@@ -141,6 +144,9 @@ class Recorder {
     counter("shape_failures", &PrismHealth::shape_failures);
     counter("contacts_rejected", &PrismHealth::contacts_rejected);
     counter("cables_rejected", &PrismHealth::cables_rejected);
+    counter("shape_resets", &PrismHealth::shape_resets);
+    counter("velocity_resets", &PrismHealth::velocity_resets);
+    counter("terrain_mismatches", &PrismHealth::terrain_mismatches);
     out["health"] = health;
     return out;
   }
@@ -149,10 +155,20 @@ class Recorder {
   std::vector<State> states_;
 };
 
-// Feeds a whole recording: at equal stamps the IMU goes first, then contacts, then cables.
+// The samples of an IMU on another rod.
+struct RodImu {
+  int rod;  // 1: r23, 2: r45
+  Stamps t;
+  Doubles gyro, accel;
+  py::ssize_t next = 0;
+};
+
+// Feeds a whole recording: at equal stamps the other rods' IMUs go first, then the base rod's, then
+// contacts, then cables.
 py::tuple replay(Estimator& estimator, const Stamps& imu_t, const Doubles& gyro,
                  const Doubles& accel, const Stamps& cables_t, const Doubles& lengths,
                  const std::optional<Stamps>& contacts_t, const std::optional<Bools>& flags,
+                 const std::vector<std::tuple<int, Stamps, Doubles, Doubles>>& rod_imus,
                  const std::optional<std::function<void(double)>>& progress) {
   check_rows(imu_t, "imu_t", imu_t.size(), 0);
   check_rows(gyro, "gyro", imu_t.size(), 3);
@@ -163,6 +179,14 @@ py::tuple replay(Estimator& estimator, const Stamps& imu_t, const Doubles& gyro,
     throw py::value_error("contacts_t and flags go together");
   }
   if (flags) check_rows(*flags, "flags", contacts_t->size(), 6);
+  std::vector<RodImu> others;
+  for (const auto& [rod, t, rate, force] : rod_imus) {
+    if (rod != 1 && rod != 2) throw py::value_error("rod_imus: expected rod 1 (r23) or 2 (r45)");
+    check_rows(t, "rod_imus t", t.size(), 0);
+    check_rows(rate, "rod_imus gyro", t.size(), 3);
+    check_rows(force, "rod_imus accel", t.size(), 3);
+    others.push_back({rod, t, rate, force});
+  }
 
   const py::ssize_t imus = imu_t.size(), cables = cables_t.size();
   const py::ssize_t contacts = contacts_t ? contacts_t->size() : 0;
@@ -192,6 +216,13 @@ py::tuple replay(Estimator& estimator, const Stamps& imu_t, const Doubles& gyro,
           }
         };
         feed_until([t](Nanoseconds stamp) { return stamp < t; });
+        for (RodImu& other : others) {
+          for (; other.next < other.t.size() && other.t.data()[other.next] <= t; ++other.next) {
+            estimator.rod_imu(other.t.data()[other.next], other.rod,
+                              Eigen::Map<const V3>(other.gyro.data() + 3 * other.next),
+                              Eigen::Map<const V3>(other.accel.data() + 3 * other.next));
+          }
+        }
         estimator.imu(t, Eigen::Map<const V3>(gyro.data() + 3 * k),
                       Eigen::Map<const V3>(accel.data() + 3 * k));
         feed_until([t](Nanoseconds stamp) { return stamp == t; });
@@ -275,7 +306,10 @@ void bind_estimator(py::module_& m) {
       .def_readwrite("shape_std_rest", &Config::shape_std_rest)
       .def_readwrite("shape_std_moving", &Config::shape_std_moving)
       .def_readwrite("terrain", &Config::terrain)
+      .def_readwrite("friction", &Config::friction)
       .def_readwrite("contact_error", &Config::contact_error)
+      .def_readwrite("rod_rate_std", &Config::rod_rate_std)
+      .def_readwrite("rod_inclination_std", &Config::rod_inclination_std)
       .def_readwrite("cable_gate", &Config::cable_gate)
       .def_readwrite("cable_offset_std", &Config::cable_offset_std)
       .def_readwrite("ground_slope_std", &Config::ground_slope_std)
@@ -298,7 +332,10 @@ void bind_estimator(py::module_& m) {
       .def_readonly("contacts_dropped", &PrismHealth::contacts_dropped)
       .def_readonly("shape_failures", &PrismHealth::shape_failures)
       .def_readonly("contacts_rejected", &PrismHealth::contacts_rejected)
-      .def_readonly("cables_rejected", &PrismHealth::cables_rejected);
+      .def_readonly("cables_rejected", &PrismHealth::cables_rejected)
+      .def_readonly("shape_resets", &PrismHealth::shape_resets)
+      .def_readonly("velocity_resets", &PrismHealth::velocity_resets)
+      .def_readonly("terrain_mismatches", &PrismHealth::terrain_mismatches);
 
   using Six = Eigen::Matrix<double, 6, 3>;
   py::class_<State>(m, "PrismState", "One state of the prism, in SI units.")
@@ -336,6 +373,10 @@ void bind_estimator(py::module_& m) {
            py::arg("config"), py::arg("tight") = true)
       .def("imu", &Estimator::imu, py::arg("t"), py::arg("gyro"), py::arg("accel"),
            "One IMU sample: t [ns], angular velocity (3,) [rad/s], specific force (3,) [m/s^2].")
+      .def("rod_imu", &Estimator::rod_imu, py::arg("t"), py::arg("rod"), py::arg("gyro"),
+           py::arg("accel"),
+           "An IMU on rod 1 (r23) or 2 (r45), z toward its even endcap: t [ns], rate (3,) [rad/s], "
+           "specific force (3,) [m/s^2]. Before the base rod's sample of the same stamp.")
       .def("cables", &Estimator::cables, py::arg("t"), py::arg("lengths"),
            "Cable lengths: t [ns], (9,) [m] in the order of PRISM_CABLES, NaN: not measured.")
       .def(
@@ -348,7 +389,9 @@ void bind_estimator(py::module_& m) {
       .def_property_readonly("initialized", &Estimator::initialized)
       .def("replay", &replay, py::arg("imu_t"), py::arg("gyro"), py::arg("accel"),
            py::arg("cables_t"), py::arg("lengths"), py::arg("contacts_t") = py::none(),
-           py::arg("flags") = py::none(), py::arg("progress") = py::none(),
+           py::arg("flags") = py::none(),
+           py::arg("rod_imus") = std::vector<std::tuple<int, Stamps, Doubles, Doubles>>{},
+           py::arg("progress") = py::none(),
            "Feeds a whole recording and returns (arrays by name, seconds in the estimator).");
 }
 

@@ -7,7 +7,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Chirality', 'ConstraintSet', 'ContactDetector', 'ContactDetectorParameters', 'ContactNoise', 'ContactPoint', 'ImuSampling', 'InvariantFilter', 'IpoptShapeSolver', 'PRISM_CABLES', 'Prism', 'PrismConfig', 'PrismEstimator', 'PrismHealth', 'PrismState', 'ShapeMethod', 'ShapeSolver', 'ShapeTracker', 'SpinMethod', 'Status', 'cable_lengths', 'endcap_jacobian', 'fold', 'in_body_frame', 'inequality_values', 'length_jacobian', 'mutual_moments', 'spin_angle']
+__all__: list[str] = ['Chirality', 'ConstraintSet', 'ContactDetector', 'ContactDetectorParameters', 'ContactNoise', 'ContactPoint', 'ImuSampling', 'InvariantFilter', 'IpoptShapeSolver', 'PRISM_CABLES', 'Prism', 'PrismConfig', 'PrismEstimator', 'PrismHealth', 'PrismState', 'ShapeMethod', 'ShapeSolver', 'ShapeTracker', 'SpinMethod', 'Status', 'Terrain', 'cable_lengths', 'endcap_jacobian', 'fold', 'in_body_frame', 'inequality_values', 'length_jacobian', 'mutual_moments', 'spin_angle']
 class Status(enum.Enum):
     """
     What a call did with its input.
@@ -349,6 +349,10 @@ class ContactNoise(enum.Enum):
 class ImuSampling(enum.Enum):
     INSTANTANEOUS = ...
     INTERVAL_MEAN = ...
+class Terrain(enum.Enum):
+    FLAT = ...
+    SLOPE = ...
+    UNKNOWN = ...
 class PrismConfig:
     """
     Settings, priors and noises of the prism's estimator.
@@ -359,6 +363,7 @@ class PrismConfig:
     shape: ShapeMethod
     spin: SpinMethod
     static_bias_initialization: bool
+    terrain: Terrain
     def __init__(self) -> None:
         ...
     @property
@@ -386,6 +391,30 @@ class PrismConfig:
     def accelerometer_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def active_force(self) -> float:
+        ...
+    @active_force.setter
+    def active_force(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def active_rate(self) -> float:
+        ...
+    @active_rate.setter
+    def active_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def cable_gate(self) -> float:
+        ...
+    @cable_gate.setter
+    def cable_gate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def cable_offset_std(self) -> float:
+        ...
+    @cable_offset_std.setter
+    def cable_offset_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def cable_std(self) -> float:
         ...
     @cable_std.setter
@@ -396,6 +425,12 @@ class PrismConfig:
         ...
     @chi_square_gate.setter
     def chi_square_gate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def contact_error(self) -> float:
+        ...
+    @contact_error.setter
+    def contact_error(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def contact_position_std(self) -> float:
@@ -410,10 +445,64 @@ class PrismConfig:
     def contact_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def creep_std(self) -> float:
+        ...
+    @creep_std.setter
+    def creep_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def endcap_acceleration_moving(self) -> float:
+        ...
+    @endcap_acceleration_moving.setter
+    def endcap_acceleration_moving(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def endcap_acceleration_rest(self) -> float:
+        ...
+    @endcap_acceleration_rest.setter
+    def endcap_acceleration_rest(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def foot_height_std(self) -> float:
+        ...
+    @foot_height_std.setter
+    def foot_height_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def foot_rise_std(self) -> float:
+        ...
+    @foot_rise_std.setter
+    def foot_rise_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def friction(self) -> float:
+        ...
+    @friction.setter
+    def friction(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def gravity(self) -> float:
         ...
     @gravity.setter
     def gravity(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def ground_height_walk(self) -> float:
+        ...
+    @ground_height_walk.setter
+    def ground_height_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def ground_slope_std(self) -> float:
+        ...
+    @ground_slope_std.setter
+    def ground_slope_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def ground_slope_walk(self) -> float:
+        ...
+    @ground_slope_walk.setter
+    def ground_slope_walk(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def gyroscope_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -470,6 +559,18 @@ class PrismConfig:
     def position_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def rod_inclination_std(self) -> float:
+        ...
+    @rod_inclination_std.setter
+    def rod_inclination_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def rod_rate_std(self) -> float:
+        ...
+    @rod_rate_std.setter
+    def rod_rate_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def shape_std_moving(self) -> float:
         ...
     @shape_std_moving.setter
@@ -480,6 +581,18 @@ class PrismConfig:
         ...
     @shape_std_rest.setter
     def shape_std_rest(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def slip_length(self) -> float:
+        ...
+    @slip_length.setter
+    def slip_length(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def slip_speed(self) -> float:
+        ...
+    @slip_speed.setter
+    def slip_speed(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def spin_prior_std(self) -> float:
@@ -519,6 +632,9 @@ class PrismHealth:
     def cables_dropped(self) -> int:
         ...
     @property
+    def cables_rejected(self) -> int:
+        ...
+    @property
     def contacts_dropped(self) -> int:
         ...
     @property
@@ -533,6 +649,15 @@ class PrismHealth:
     @property
     def shape_failures(self) -> int:
         ...
+    @property
+    def shape_resets(self) -> int:
+        ...
+    @property
+    def terrain_mismatches(self) -> int:
+        ...
+    @property
+    def velocity_resets(self) -> int:
+        ...
 class PrismState:
     """
     One state of the prism, in SI units.
@@ -541,6 +666,11 @@ class PrismState:
     def accel_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """
         (3,), body [m/s^2]
+        """
+    @property
+    def cable_nis(self) -> float:
+        """
+        of the newest lengths, per degree of freedom; NaN: none
         """
     @property
     def contacts(self) -> typing.Annotated[list[bool], "FixedSize(6)"]:
@@ -561,6 +691,11 @@ class PrismState:
     def endcaps_world(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 3]"]:
         """
         (6, 3) [m]
+        """
+    @property
+    def ground_nis(self) -> float:
+        """
+        of the newest heights of the feet, per degree of freedom; NaN: none
         """
     @property
     def gyro_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
@@ -627,11 +762,11 @@ class PrismEstimator:
     """
     Streaming estimator: IMU, cables and contacts in, state out.
     """
-    def __init__(self, robot: Prism, config: PrismConfig) -> None:
+    def __init__(self, robot: Prism, config: PrismConfig, tight: bool = True) -> None:
         ...
     def cables(self, t: typing.SupportsInt | typing.SupportsIndex, lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"]) -> Status:
         """
-        Cable lengths: t [ns], (9,) [m] in the order of PRISM_CABLES.
+        Cable lengths: t [ns], (9,) [m] in the order of PRISM_CABLES, NaN: not measured.
         """
     def contacts(self, t: typing.SupportsInt | typing.SupportsIndex, flags: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> Status:
         """
@@ -641,14 +776,13 @@ class PrismEstimator:
         """
         One IMU sample: t [ns], angular velocity (3,) [rad/s], specific force (3,) [m/s^2].
         """
-    def replay(self, imu_t: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cables_t: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], contacts_t: typing.Annotated[numpy.typing.ArrayLike, numpy.int64] | None = None, flags: typing.Annotated[numpy.typing.ArrayLike, numpy.bool] | None = None, progress: collections.abc.Callable[[float], None] | None = None) -> tuple:
+    def replay(self, imu_t: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cables_t: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], contacts_t: typing.Annotated[numpy.typing.ArrayLike, numpy.int64] | None = None, flags: typing.Annotated[numpy.typing.ArrayLike, numpy.bool] | None = None, rod_imus: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.int64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]] = [], progress: collections.abc.Callable[[float], None] | None = None) -> tuple:
         """
         Feeds a whole recording and returns (arrays by name, seconds in the estimator).
         """
-    @property
-    def filter(self) -> InvariantFilter:
+    def rod_imu(self, t: typing.SupportsInt | typing.SupportsIndex, rod: typing.SupportsInt | typing.SupportsIndex, gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> Status:
         """
-        A copy of the invariant filter's mean and covariance.
+        An IMU on rod 1 (r23) or 2 (r45), z toward its even endcap: t [ns], rate (3,) [rad/s], specific force (3,) [m/s^2]. Before the base rod's sample of the same stamp.
         """
     @property
     def initialized(self) -> bool:

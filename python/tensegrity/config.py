@@ -62,6 +62,9 @@ class Settings(StrictModel):
     terrain: Literal["flat", "slope", "unknown"] = field(
         "filter: tight, the ground is level, one plane of unknown slope, or changes on the way"
     )
+    friction: float = field(
+        "filter: tight, coefficient of friction of the ground, matters on slopes alone", gt=0
+    )
     contact_error: float = field(
         "filter: tight, share of contact flags that are wrong: flags are evidence, not truth",
         gt=0,
@@ -147,6 +150,10 @@ class Noises(StrictModel):
     )
     foot_rise_std: float = field("motion of a foot across the ground", unit="m/sqrt(s)", gt=0)
     foot_height_std: float = field("height of a foot above the ground", unit="m*sqrt(s)", gt=0)
+    rod_rate_std: float = field("other rods' IMUs: their turn across the rod", unit="rad/s", gt=0)
+    rod_inclination_std: float = field(
+        "other rods' IMUs: the rod's inclination in quiet, as a cosine", gt=0
+    )
     ground_height_walk: float = field(
         "random walk of the ground's height in motion, with terrain: unknown",
         unit="m/sqrt(s)",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, SupportsIndex, SupportsInt
 
@@ -19,6 +19,12 @@ from tensegrity.sequence import Sequence
 from tensegrity.trajectory import Trajectory
 
 Progress = Callable[[float], None]
+
+RodImu = tuple[SupportsInt | SupportsIndex, ArrayLike, ArrayLike, ArrayLike]
+"""Number of the rod (1: r23, 2: r45), stamps [ns], rates [rad/s], specific forces [m/s^2]."""
+
+ROD_IMUS = ("r23", "r45")
+"""Names of the IMUs on the other rods in a recording: their files are ``imu_<name>.csv``."""
 
 
 class PrismEstimator(_core.PrismEstimator):
@@ -67,9 +73,13 @@ class PrismEstimator(_core.PrismEstimator):
         lengths: ArrayLike,
         contacts_t: ArrayLike | None = None,
         flags: ArrayLike | None = None,
+        rod_imus: Iterable[RodImu] = (),
         progress: Progress | None = None,
     ) -> tuple[dict[str, Any], float]:
-        """Feeds a whole recording and returns (arrays by name, seconds in the estimator)."""
+        """Feeds a whole recording and returns (arrays by name, seconds in the estimator).
+
+        ``rod_imus``: the samples of each IMU on another rod.
+        """
         return super().replay(
             imu_t,
             self._to_body(gyro),
@@ -78,6 +88,7 @@ class PrismEstimator(_core.PrismEstimator):
             self._without_offsets(lengths),
             contacts_t,
             flags,
+            list(rod_imus),
             progress,
         )
 
@@ -111,6 +122,11 @@ def estimate(
         sequence.cables.lengths,
         None if contacts is None else contacts.t_ns,
         None if contacts is None else contacts.flags,
+        [
+            (rod, imu.t_ns, imu.gyro, imu.accel)
+            for rod, name in enumerate(ROD_IMUS, start=1)
+            if (imu := sequence.other_imus.get(name)) is not None
+        ],
         progress,
     )
     if len(arrays["t_ns"]) == 0:

@@ -1,7 +1,8 @@
 // Everything that can be set about the prism's estimator, in one plain struct.
 //
-// The defaults are T's method, the packaged profile `paper`. Python fills this struct from YAML,
-// where every field has the same name (python/tensegrity/config.py).
+// The defaults are those of the packaged profiles: T's method for the loosely coupled filter
+// (`paper`), the tuned values for the tightly coupled one (`full`). Python fills this struct from
+// YAML, where every field has the same name (python/tensegrity/config.py).
 #pragma once
 
 #include <cstdint>
@@ -78,7 +79,7 @@ struct PrismConfig {
   Scalar accelerometer_std = Scalar(0.043);        // of one sample [m/s^2]
   Scalar gyroscope_bias_walk = Scalar(0.001);      // [rad/s/sqrt(s)]
   Scalar accelerometer_bias_walk = Scalar(0.001);  // [m/s^2/sqrt(s)]
-  Scalar cable_std = Scalar(0.002);                // [m]
+  Scalar cable_std = Scalar(0.0035);               // [m]
   // the loosely coupled filter alone
   Scalar contact_std = Scalar(0.05);           // random walk of a contact point [m/sqrt(s)]
   Scalar contact_position_std = Scalar(0.05);  // contact kinematics, white part [m]
@@ -95,6 +96,8 @@ struct PrismConfig {
   Scalar slip_speed = Scalar(0.03);           // above it a foot informs across its slip [m/s]
   Scalar foot_rise_std = Scalar(0.024);       // speed off the ground [m/sqrt(s)]
   Scalar foot_height_std = Scalar(0.00125);   // height above the ground [m sqrt(s)]
+  Scalar rod_rate_std = Scalar(0.2);          // other rods' IMUs: turn across the rod [rad/s]
+  Scalar rod_inclination_std = Scalar(0.02);  // other rods' IMUs: u . e_z in quiet [1]
   Scalar ground_height_walk = Scalar(0.005);  // terrain unknown, moving [m/sqrt(s)]
   Scalar ground_slope_walk = Scalar(0.01);    // terrain unknown, moving [1/sqrt(s)]
 };

@@ -101,6 +101,10 @@ class LooseFilter {
     if (started_) release_anchors();
   }
 
+  // T has one IMU: those of other rods are not used.
+  void set_rod_imu(int, const V3&, const V3&) {}
+  void forget_still() {}
+
   // After a gap too long to bridge: anything up to a walking pace may have happened.
   void open(Scalar dt) {
     while (belief_.anchor_count > 0) inekf::marginalise(belief_, belief_.anchor_count - 1);

@@ -82,6 +82,27 @@ class PrismEstimator {
     return take(item);
   }
 
+  // An IMU on rod 1 (r23) or 2 (r45): rate [rad/s] and specific force [m/s^2] in its own frame, z
+  // along the rod toward its even endcap, any mounting about it. Taken with the base rod's next
+  // sample (call this one first at equal stamps), forgotten when that is later than `max_latency`.
+  Status rod_imu(Nanoseconds t, int rod, const V3& gyro, const V3& accel) {
+    Status status = Status::kOk;
+    if (rod != 1 && rod != 2) {
+      status = Status::kOutOfRange;
+    } else {
+      status = check_sample(gyro, accel);
+    }
+    if (status == Status::kOk && imu_seen_ && seconds(t, time_) > config_.max_latency) {
+      status = Status::kTooLate;
+    }
+    if (status != Status::kOk) {
+      ++health_.imu_dropped;
+      return status;
+    }
+    filter_.set_rod_imu(rod, gyro, accel);
+    return Status::kOk;
+  }
+
   // Which endcaps are on the ground. Without any call, the built-in detector decides.
   Status contacts(Nanoseconds t, const Flags& flags) {
     const Status status = check_stamp(t, last_contacts_, contacts_seen_);
@@ -115,6 +136,7 @@ class PrismEstimator {
 
  private:
   static constexpr Scalar kPriorSigmas = Scalar(5);
+  static constexpr Scalar kUniform = Scalar(0.2886751);   // 1/sqrt(12)
   static constexpr Scalar kLongestBridge = Scalar(1);     // [s]
   static constexpr Scalar kLargestRate = Scalar(200);     // [rad/s], no gyro reaches it
   static constexpr Scalar kLargestForce = Scalar(20000);  // [m/s^2], 2000 g
@@ -125,11 +147,17 @@ class PrismEstimator {
 
   // ---- input checks
 
-  Status check_imu(Nanoseconds t, const V3& gyro, const V3& accel) const {
+  static Status check_sample(const V3& gyro, const V3& accel) {
     if (!gyro.allFinite() || !accel.allFinite()) return Status::kNotFinite;
     if (gyro.cwiseAbs().maxCoeff() > kLargestRate || accel.cwiseAbs().maxCoeff() > kLargestForce) {
       return Status::kOutOfRange;
     }
+    return Status::kOk;
+  }
+
+  Status check_imu(Nanoseconds t, const V3& gyro, const V3& accel) const {
+    const Status status = check_sample(gyro, accel);
+    if (status != Status::kOk) return status;
     if (imu_seen_ && t == time_) return Status::kDuplicate;
     if (imu_seen_ && t < time_) return Status::kOutOfOrder;
     return Status::kOk;
@@ -194,13 +222,15 @@ class PrismEstimator {
     }
     inekf::ImuSample<Scalar> mean = sample;
     Scalar gyro_std = config_.gyroscope_std, accel_std = config_.accelerometer_std;
-    if (gap || config_.imu_sampling == ImuSampling::kInstantaneous) {
+    const bool instantaneous = config_.imu_sampling == ImuSampling::kInstantaneous;
+    if (gap || instantaneous) {
+      // The mean over the step is somewhere between its ends, in an impact anywhere between:
+      // uniform over the difference. What a gap hides may even lie beyond.
       mean.gyro = (previous.gyro + sample.gyro) / 2;
       mean.accel = (previous.accel + sample.accel) / 2;
-    }
-    if (gap) {  // what happened between the two samples is as uncertain as they differ
-      gyro_std = std::max(gyro_std, (sample.gyro - previous.gyro).norm());
-      accel_std = std::max(accel_std, (sample.accel - previous.accel).norm());
+      const Scalar part = gap ? Scalar(1) : kUniform;
+      gyro_std = std::hypot(gyro_std, part * (sample.gyro - previous.gyro).norm());
+      accel_std = std::hypot(accel_std, part * (sample.accel - previous.accel).norm());
     }
     filter_.observe_motion(mean, dt);
     Nanoseconds now = begin;
@@ -235,7 +265,7 @@ class PrismEstimator {
     const int before = start_.samples();
     const bool still = !config_.static_bias_initialization || start_.add(gyro, accel);
     if (!still) {
-      if (start_.samples() <= before) still_cables_.fill(0);  // a window was given up
+      if (start_.samples() <= before) forget_still();
       return Status::kNotInitialized;
     }
     const bool measured = *std::min_element(still_cables_.begin(), still_cables_.end()) > 0;
@@ -246,11 +276,17 @@ class PrismEstimator {
             : AtRest<Scalar>{config_.gyroscope_bias, accel, 1, mean_lengths_};
     if (!measured || !filter_.start(rest, health_)) {
       start_.clear();
-      still_cables_.fill(0);
+      forget_still();
       return Status::kNotInitialized;
     }
     initialized_ = true;
     return Status::kOk;
+  }
+
+  // The window was given up.
+  void forget_still() {
+    still_cables_.fill(0);
+    filter_.forget_still();
   }
 
   Prism<Scalar> robot_;

@@ -26,6 +26,7 @@
 #include "tensegrity/tight/members.hpp"
 #include "tensegrity/tight/place.hpp"
 #include "tensegrity/tight/propagate.hpp"
+#include "tensegrity/tight/rod_imu.hpp"
 
 namespace tensegrity {
 
@@ -90,14 +91,32 @@ class TightFilter {
     flags_are_new_ = true;
   }
 
+  // An IMU on rod 1 (r23) or 2 (r45), z toward its even endcap. Used at the end of the step.
+  void set_rod_imu(int rod, const V3& gyro, const V3& accel) {
+    RodImu& imu = rod_imus_[std::size_t(rod - 1)];
+    imu.gyro = gyro;
+    imu.accel = accel;
+    imu.fresh = true;
+    if (!started_) {  // the robot stands still: this is the bias
+      ++imu.still;
+      imu.bias += (gyro - imu.bias) / Scalar(imu.still);
+    }
+  }
+  // The still window was given up.
+  void forget_still() {
+    for (RodImu& imu : rod_imus_) imu.still = 0;
+  }
+
   // The feet, once all measurements of the step are in.
   void end_step(Scalar dt, PrismHealth& health) {
+    correct_rods();
     const Endcaps<Scalar> world = belief_.endcaps_world();
     loaded_ = detector_.update(world, dt);
     if (flags_are_new_) loaded_ = detector_.measure(flags_, flag_odds_);
     flags_are_new_ = false;
     correct_feet(world, dt);
     watch(dt, health);
+    for (RodImu& imu : rod_imus_) imu.fresh = false;
   }
 
   // ---- start, and what has to be given up
@@ -156,6 +175,7 @@ class TightFilter {
     tight::hold_rods(belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
     detector_.reset();
     last_lengths_ = rest.lengths;
+    started_ = true;
     return true;
   }
 
@@ -212,6 +232,33 @@ class TightFilter {
     return parameters;
   }
 
+  struct RodImu {
+    V3 gyro = V3::Zero(), accel = V3::Zero(), bias = V3::Zero();
+    int still = 0;  // samples in the bias
+    bool fresh = false;
+  };
+
+  // Rate of a rod about its own axis [rad/s], NaN: not measured now.
+  Scalar spin(int rod) const {
+    if (rod == 0) return std::numeric_limits<Scalar>::quiet_NaN();
+    const RodImu& imu = rod_imus_[std::size_t(rod - 1)];
+    return imu.fresh ? imu.gyro.z() - imu.bias.z() : std::numeric_limits<Scalar>::quiet_NaN();
+  }
+
+  void correct_rods() {
+    tight::SequentialUpdate<Scalar> update(belief_);
+    for (int rod = 1; rod <= 2; ++rod) {
+      const RodImu& imu = rod_imus_[std::size_t(rod - 1)];
+      if (!imu.fresh) continue;
+      // In motion the accelerometer feels the rod's own acceleration, for as long as it lasts.
+      const Scalar shaken = std::abs(imu.accel.norm() - config_.gravity) / config_.gravity +
+                            activity_.level() * kInclinationMoving;
+      tight::correct_rod(update, belief_, rod, V3(imu.gyro - imu.bias), imu.accel,
+                         robot_.rod_length, config_.gravity, kLeastTurn,
+                         {config_.rod_rate_std, config_.rod_inclination_std + shaken});
+    }
+  }
+
   void correct_feet(const Endcaps<Scalar>& world, Scalar dt) {
     const std::array<Scalar, 6> shares =
         contact::support_shares(world, loaded_, Scalar(kLeastLoad));
@@ -225,7 +272,8 @@ class TightFilter {
     for (int endcap = 0; endcap < 6; ++endcap) {
       const Scalar share = shares[std::size_t(endcap)];
       if (!(share > 0)) continue;
-      const auto foot = tight::correct_foot(update, belief_, endcap, share, robot_, noise, dt);
+      const auto foot =
+          tight::correct_foot(update, belief_, endcap, share, robot_, noise, dt, spin(endcap / 2));
       chi_square += foot.height_chi_square;
       feet += 1;
       if (share > kWatchedShare) worst_height_ = std::max(worst_height_, std::abs(foot.height));
@@ -302,6 +350,10 @@ class TightFilter {
   static constexpr Scalar kLostTime = Scalar(0.3);
   static constexpr Scalar kWatchedShare = Scalar(0.15);
   static constexpr int kLostSamples = 10;  // in a row with most cables rejected
+  // Turns of a rod below this have no measured direction [rad/s]; at full activity the
+  // inclination from its accelerometer is this uncertain [1].
+  static constexpr Scalar kLeastTurn = Scalar(0.2);
+  static constexpr Scalar kInclinationMoving = Scalar(0.3);
   // Level floors: 10 mm over 4 m is the tolerance of DIN 18202.
   static constexpr Scalar kFlatSlopeStd = Scalar(0.0025);
   static constexpr Scalar kSlopeNoticed = Scalar(5) * kFlatSlopeStd;
@@ -329,8 +381,9 @@ class TightFilter {
   Scalar flag_odds_;
   Activity<Scalar> activity_;
   Belief belief_;
+  std::array<RodImu, 2> rod_imus_{};
   Flags flags_{}, loaded_{};
-  bool flags_are_new_ = false;
+  bool flags_are_new_ = false, started_ = false;
   int cable_samples_ = 0;
   CableLengths<Scalar> last_lengths_ = CableLengths<Scalar>::Zero();
   Scalar worst_height_ = 0, slowest_foot_ = 0;  // of the last step [m], [m/s]

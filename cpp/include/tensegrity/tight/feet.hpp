@@ -10,6 +10,8 @@
 // them.
 #pragma once
 
+#include <limits>
+
 #include "tensegrity/tight/sequential_update.hpp"
 
 namespace tensegrity::tight {
@@ -21,7 +23,9 @@ class Foot {
   using V3 = Vector3<Scalar>;
   using M3 = Matrix3<Scalar>;
 
-  Foot(const B& belief, int endcap, Scalar radius, Scalar rod_length, const V3& normal)
+  // `spin`: rate of a free rod about its own axis [rad/s], NaN: not measured.
+  Foot(const B& belief, int endcap, Scalar radius, Scalar rod_length, const V3& normal,
+       Scalar spin = std::numeric_limits<Scalar>::quiet_NaN())
       : even_(endcap / 2 * 2), base_(endcap < 2) {
     const M3& rotation = belief.rotation;
     if (base_) {
@@ -36,12 +40,14 @@ class Foot {
         (belief.endcap_velocity(even_) - belief.endcap_velocity(even_ + 1)) / rod_length;
     // (u x turn) x n = turn (u . n) - u (turn . n)
     const V3 about = u.cross(normal);
-    slip_ = belief.endcap_velocity(endcap) - radius * (turn * u.dot(normal) - u * turn.dot(normal) +
-                                                       u.dot(rotation * belief.rate) * about);
+    const bool measured = !std::isnan(spin);
+    const Scalar about_itself = measured ? spin : u.dot(rotation * belief.rate);
+    slip_ = belief.endcap_velocity(endcap) -
+            radius * (turn * u.dot(normal) - u * turn.dot(normal) + about_itself * about);
     by_even_ = -(radius / rod_length) * (u.dot(normal) * M3::Identity() - u * normal.transpose());
     by_odd_ = -by_even_;
     (endcap == even_ ? by_even_ : by_odd_) += M3::Identity();
-    by_gyro_bias_ = radius * about * (u.transpose() * rotation);
+    if (!measured) by_gyro_bias_ = radius * about * (u.transpose() * rotation);
   }
 
   // Velocity of the touching point, world [m/s].

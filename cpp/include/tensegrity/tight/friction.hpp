@@ -53,17 +53,18 @@ struct FootResult {
   Scalar height_chi_square;  // one degree of freedom
 };
 
-// One foot on the ground for `dt` [s].
+// One foot on the ground for `dt` [s]. `spin` as in feet.hpp.
 //
 // How much a foot is believed to touch at all grows with the square of its share, up to a third:
 // the foot that is about to lift off carries little, and holding it down would bend the shape.
 template <typename Scalar>
 FootResult<Scalar> correct_foot(SequentialUpdate<Scalar>& update, const Belief<Scalar>& belief,
                                 int endcap, Scalar share, const Prism<Scalar>& robot,
-                                const FootNoise<Scalar>& noise, Scalar dt) {
+                                const FootNoise<Scalar>& noise, Scalar dt,
+                                Scalar spin = std::numeric_limits<Scalar>::quiet_NaN()) {
   using V3 = Vector3<Scalar>;
   const V3 normal = belief.ground_normal();
-  const Foot<Scalar> foot(belief, endcap, robot.endcap_radius, robot.rod_length, normal);
+  const Foot<Scalar> foot(belief, endcap, robot.endcap_radius, robot.rod_length, normal, spin);
   const Scalar rise = normal.dot(foot.slip());
   const V3 slip = foot.slip() - rise * normal;
   const Scalar speed = slip.norm();
