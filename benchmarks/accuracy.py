@@ -2,7 +2,7 @@
 
     python benchmarks/accuracy.py                              # what the README shows
     python benchmarks/accuracy.py --methods full mine.yaml --seeds 10-19 --manoeuvres forward
-    python benchmarks/accuracy.py --ablation
+    python benchmarks/accuracy.py --ablation                   # part by part: accuracy_ablation.py
     python benchmarks/accuracy.py --variants                   # other ground, robot, sensors
     python benchmarks/accuracy.py --variants nominal imu-gaps --seeds 0 --manoeuvres forward
     python benchmarks/accuracy.py recordings/monday recordings/tuesday
@@ -24,8 +24,8 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from accuracy_ablation import Methods, ablation
 from accuracy_table import Result, table
 from accuracy_variants import NOMINAL, VARIANTS, Variant
 
@@ -36,17 +36,6 @@ from tensegrity.config import FilterConfig
 from tensegrity.errors import InputError
 from tensegrity.evaluation import evaluate
 from tensegrity.simulation import Manoeuvre
-
-Methods = dict[str, FilterConfig]
-"""Configurations by the label they have in the table."""
-
-# What separates the profile `full` from `paper`, and the numbers that only this setting reads.
-_SWITCHES: dict[str, tuple[tuple[str, str], ...]] = {
-    "shape": (("noises", "shape_std_rest"), ("noises", "shape_std_moving")),
-    "spin": (("priors", "spin_std"), ("noises", "spin_std")),
-    "contact_point": (),
-    "contact_noise": (("noises", "contact_position_std"),),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,32 +100,6 @@ def run_all(recordings: Sequence[Recording], methods: Methods, jobs: int) -> lis
         return [result for future in futures for result in future.result()]
 
 
-# --- methods ------------------------------------------------------------------------------------
-
-
-def ablation() -> Methods:
-    """``paper`` and ``full``, and each of them with one setting of the other at a time."""
-    profiles = {name: FilterConfig.load(name) for name in ("paper", "full")}
-    methods: Methods = {}
-    for name, other in (("paper", "full"), ("full", "paper")):
-        methods[name] = profiles[name]
-        for setting in _SWITCHES:
-            switched = _switched(profiles[name], profiles[other], setting)
-            if switched == profiles[name]:
-                continue  # contact noise from the shape means nothing without a tracked shape
-            methods[f"{name}, {setting}: {getattr(switched.settings, setting)}"] = switched
-    return methods
-
-
-def _switched(config: FilterConfig, other: FilterConfig, setting: str) -> FilterConfig:
-    values: dict[str, dict[str, Any]] = config.model_dump()
-    for section, key in (("settings", setting), *_SWITCHES[setting]):
-        values[section][key] = getattr(getattr(other, section), key)
-    if values["settings"]["shape"] == "least_squares":
-        values["settings"]["contact_noise"] = "constant"
-    return FilterConfig.model_validate(values)
-
-
 # --- command line -------------------------------------------------------------------------------
 
 
@@ -175,7 +138,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument(
         "--ablation",
         action="store_true",
-        help="instead of --methods: paper and full with one setting of the other at a time",
+        help="instead of --methods: full with one part at a time switched off, and paper",
     )
     parser.add_argument("--out", type=Path, default=Path("runs/accuracy"))
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")

@@ -12,6 +12,14 @@ from tensegrity.sequence import Sequence
 from tensegrity.simulation import SimulationOptions
 
 
+def changed(config: FilterConfig, **sections: Mapping[str, Any]) -> FilterConfig:
+    """``config`` with other values in its ``sections``: ``settings``, ``priors``, ``noises``."""
+    values = config.model_dump()
+    for section, differing in sections.items():
+        values[section] |= differing
+    return FilterConfig.model_validate(values)
+
+
 @dataclass(frozen=True)
 class Variant:
     """One difference from the nominal recording, and what the user tells the filter about it.
@@ -33,9 +41,7 @@ class Variant:
 
     def declared(self, config: FilterConfig) -> FilterConfig:
         """``config`` with the variant's ``settings``."""
-        values = config.model_dump()
-        values["settings"] |= self.settings
-        return FilterConfig.model_validate(values)
+        return changed(config, settings=self.settings)
 
     def sensed(self, sequence: Sequence) -> Sequence:
         """What the estimator gets of a recording."""
@@ -56,10 +62,11 @@ VARIANTS = {
             Variant(
                 f"slope-5deg-{direction}",
                 {"slope": 5.0, "slope_direction": float(direction)},
-                settings={},
+                settings={"terrain": "slope"},
             )
             for direction in (0, 120, 240)
         ),
+        Variant("slope-5deg-0-called-flat", {"slope": 5.0}, settings={"terrain": "flat"}),
         Variant("stiff-floor", {"floor_time_constant": 0.005}),
         # robot and gait
         Variant("endcaps-5mm", {"endcap_radius": 0.005}),
