@@ -29,12 +29,50 @@ def test_packaged_profiles_are_complete_and_of_their_method(name: str) -> None:
 def test_the_paper_is_as_published() -> None:
     config = FilterConfig.load("paper")
     settings, noises = config.settings, config.noises
+    assert settings.filter == "loose"
     assert (settings.shape, settings.spin) == ("least_squares", "fixed")
     assert (settings.contact_point, settings.contact_noise) == ("centre", "constant")
     # T Table I
     assert (noises.accelerometer_std, noises.gyroscope_std) == (0.043, 0.002)
     assert (noises.accelerometer_bias_std, noises.gyroscope_bias_std) == (0.001, 0.001)
     assert noises.contact_std == 0.05
+
+
+def test_full_is_the_tightly_coupled_filter() -> None:
+    assert FilterConfig.load("full").settings.filter == "tight"
+
+
+def test_the_loosely_coupled_filter_is_one_setting_away(tmp_path: Path) -> None:
+    """With its improvements, which the profile names besides."""
+    settings = load_text(tmp_path, "settings:\n  filter: loose\n").settings
+    assert (settings.method, settings.filter) == ("full", "loose")
+    assert (settings.shape, settings.spin) == ("tracker", "estimated")
+    assert (settings.contact_point, settings.contact_noise) == ("rolling", "from_shape")
+
+
+@pytest.mark.parametrize("base", ["paper", "full"])
+def test_every_profile_takes_the_declarations_of_the_other_filter(
+    base: str, tmp_path: Path
+) -> None:
+    """So that one file of a user serves both methods."""
+    declared = "settings:\n  terrain: slope\n  friction: 0.5\n  contact_error: 0.2\n"
+    settings = load_text(tmp_path, f"base: {base}\n{declared}").settings
+    assert (settings.terrain, settings.friction, settings.contact_error) == ("slope", 0.5, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("section", "key"),
+    [
+        ("settings", "cable_gate"),  # takes all
+        ("priors", "cable_offset_std"),  # there are none
+        ("priors", "ground_slope_std"),
+        ("noises", "slip_length"),  # feet never slip
+        ("noises", "ground_slope_walk"),
+    ],
+)
+def test_zero_switches_off(section: str, key: str, tmp_path: Path) -> None:
+    config = load_text(tmp_path, f"{section}:\n  {key}: 0\n")
+    assert getattr(getattr(config, section), key) == 0
 
 
 @pytest.mark.parametrize(
@@ -99,6 +137,7 @@ def test_every_physical_quantity_has_a_unit() -> None:
     }
     assert without == {
         "method",
+        "filter",
         "shape",
         "spin",
         "contact_point",
@@ -106,6 +145,11 @@ def test_every_physical_quantity_has_a_unit() -> None:
         "imu_sampling",
         "static_bias_initialization",
         "chi_square_gate",
+        "terrain",
+        "friction",
+        "contact_error",
+        "cable_gate",
+        "rod_inclination_std",
     }
 
 

@@ -87,7 +87,8 @@ def test_random_damage_is_an_input_error_or_still_a_sequence(
         described = error
     else:
         assert np.isfinite(sequence.imu.gyro).all()
-        assert (sequence.cables.lengths > 0).all()
+        lengths = sequence.cables.lengths
+        assert ((lengths > 0) | np.isnan(lengths)).all()  # a cell may have become empty
         return
     assert described.file is not None
     assert described.file.exists()
