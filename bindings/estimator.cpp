@@ -121,6 +121,8 @@ class Recorder {
            [&](const State& s, double* to) { matrix(s.rotation_covariance, to); });
     column("velocity_covariance", {3, 3},
            [&](const State& s, double* to) { matrix(s.velocity_covariance, to); });
+    column("load_shares", {6},
+           [](const State& s, double* to) { std::copy_n(s.load_shares.begin(), 6, to); });
     column("cable_nis", {}, [](const State& s, double* to) { *to = s.cable_nis; });
     column("ground_nis", {}, [](const State& s, double* to) { *to = s.ground_nis; });
     py::array_t<bool> contacts({py::ssize_t(states_.size()), py::ssize_t(6)});
@@ -361,6 +363,8 @@ void bind_estimator(py::module_& m) {
       .def_readonly("velocity_covariance", &State::velocity_covariance, "(3, 3) [m^2/s^2]")
       .def_readonly("position_covariance", &State::position_covariance, "(3, 3) [m^2]")
       .def_readonly("contacts", &State::contacts, "endcaps held as contacts")
+      .def_readonly("load_shares", &State::load_shares,
+                    "share of the weight each contact carries, six numbers that sum to 1")
       .def_readonly("cable_nis", &State::cable_nis,
                     "of the newest lengths, per degree of freedom; NaN: none")
       .def_readonly("ground_nis", &State::ground_nis,

@@ -148,6 +148,15 @@ def _state_columns(robot: Robot, health: list[str]) -> list[Column]:
         ),
         *contact_columns(robot),
         *(
+            Column(
+                f"load_{endcap}",
+                "an empty cell or a share between 0 and 1",
+                lambda share: (share >= 0) & (share <= 1),
+                may_be_empty=True,
+            )
+            for endcap in range(robot.number_of_endcaps)
+        ),
+        *(
             Column(f"{_HEALTH}{name}", "a count >= 0", lambda counts: counts >= 0)
             for name in health
         ),
@@ -171,6 +180,7 @@ def _pack(trajectory: Trajectory) -> FloatArray:
             trajectory.cable_nis,
             trajectory.ground_nis,
             trajectory.contacts,
+            trajectory.load_shares,
             *trajectory.health.values(),
         ]
     )
@@ -180,9 +190,9 @@ def _unpack(
     poses: PoseStream, endcaps: EndcapStream, state: FloatArray, health: list[str], info: RunInfo
 ) -> Trajectory:
     count = info.robot.number_of_endcaps
-    sizes = [3, 3, 3, 1, 6, 6, 6, len(_NIS), count]
+    sizes = [3, 3, 3, 1, 6, 6, 6, len(_NIS), count, count]
     parts = np.split(state, np.cumsum(sizes), axis=1)
-    velocity, gyro_bias, accel_bias, spin, *covariances, nis, contacts, counters = parts
+    velocity, gyro_bias, accel_bias, spin, *covariances, nis, contacts, shares, counters = parts
     rotation = Rotation.from_quat(poses.quaternion).as_matrix()
     relative = endcaps.position - poses.position[:, None]
     position_covariance, orientation_covariance, velocity_covariance = map(_symmetric, covariances)
@@ -201,6 +211,7 @@ def _unpack(
         orientation_covariance=orientation_covariance,
         velocity_covariance=velocity_covariance,
         health=_counters(health, counters),
+        load_shares=shares,
         cable_nis=nis[:, 0],
         ground_nis=nis[:, 1],
         runtime_s=info.runtime_s,

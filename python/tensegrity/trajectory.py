@@ -24,6 +24,7 @@ class Trajectory:
     * ``gyro_bias`` (N, 3) [rad/s], ``accel_bias`` (N, 3) [m/s^2]
     * ``spin`` (N,) angle of the shape about the base rod, phi [rad]
     * ``endcaps_body`` (N, E, 3), ``endcaps_world`` (N, E, 3) [m]
+    * ``load_shares`` (N, E) share of the weight each contact carries, NaN: not known
     * ``contacts`` (N, E) endcaps the filter holds as contacts
     * ``position_covariance`` (N, 3, 3) of the position error in the world [m^2]
     * ``orientation_covariance`` (N, 3, 3) of the rotation error in the world [rad^2]
@@ -49,6 +50,7 @@ class Trajectory:
     orientation_covariance: FloatArray
     velocity_covariance: FloatArray
     health: dict[str, IntArray] = field(default_factory=dict)
+    load_shares: FloatArray = field(default_factory=lambda: np.empty(0))
     cable_nis: FloatArray = field(default_factory=lambda: np.empty(0))
     ground_nis: FloatArray = field(default_factory=lambda: np.empty(0))
     runtime_s: float = 0.0
@@ -57,7 +59,12 @@ class Trajectory:
     """Method, sequence name and whatever else describes the run."""
 
     def __post_init__(self) -> None:
-        for name in ("cable_nis", "ground_nis"):
+        like = {
+            "load_shares": self.contacts,
+            "cable_nis": self.t_ns,
+            "ground_nis": self.t_ns,
+        }
+        for name, other in like.items():
             if not len(getattr(self, name)):
                 # The class is frozen for its users; this is still its construction.
-                object.__setattr__(self, name, np.full(len(self.t_ns), np.nan))
+                object.__setattr__(self, name, np.full(other.shape, np.nan))

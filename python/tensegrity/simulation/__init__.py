@@ -2,6 +2,6 @@
 
 from tensegrity.simulation.manoeuvres import Manoeuvre
 from tensegrity.simulation.options import SimulationOptions
-from tensegrity.simulation.simulate import simulate
+from tensegrity.simulation.simulate import simulate, simulate_with_forces
 
-__all__ = ["Manoeuvre", "SimulationOptions", "simulate"]
+__all__ = ["Manoeuvre", "SimulationOptions", "simulate", "simulate_with_forces"]

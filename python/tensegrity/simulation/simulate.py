@@ -67,6 +67,17 @@ def simulate(
     Raises :class:`InputError` for an unknown manoeuvre and for a robot that cannot do it, and
     :class:`MissingExtraError` without MuJoCo.
     """
+    return simulate_with_forces(manoeuvre, options, robot, progress)[0]
+
+
+def simulate_with_forces(
+    manoeuvre: str | Manoeuvre,
+    options: SimulationOptions | None = None,
+    robot: Robot | None = None,
+    progress: Progress | None = None,
+) -> tuple[Sequence, FloatArray]:
+    """As :func:`simulate`, with the normal forces (N, 6) between endcaps and ground [N] at the
+    stamps of the IMU."""
     manoeuvre = Manoeuvre.named(manoeuvre)
     options = SimulationOptions() if options is None else options
     robot = _variant(load() if robot is None else robot, options)
@@ -90,7 +101,10 @@ def simulate(
     _roll(log, gait, draw.cable_speed, path_length, progress)
     _come_to_rest(log)
     _stand(log, options.still_end)
-    return _recording(f"{manoeuvre}-{options.seed}", log, options, draw.imu_turns, sensor_rngs)
+    recording = _recording(f"{manoeuvre}-{options.seed}", log, options, draw.imu_turns, sensor_rngs)
+    assert recording.groundtruth is not None
+    samples = slice(IMU_STEPS, IMU_STEPS * (len(recording.groundtruth.t_ns) + 1), IMU_STEPS)
+    return recording, log.normal_forces()[samples]
 
 
 def _variant(robot: Robot, options: SimulationOptions) -> Robot:

@@ -41,6 +41,9 @@ struct PrismState {
   Matrix3<Scalar> velocity_covariance = Matrix3<Scalar>::Zero();      // world [m^2/s^2]
   Matrix3<Scalar> position_covariance = Matrix3<Scalar>::Zero();      // world [m^2]
   std::array<bool, 6> contacts{};  // endcaps that the filter holds as contacts
+  // Share of the robot's weight that each of them carries, from the geometry at rest; their sum
+  // is 1.
+  std::array<Scalar, 6> load_shares{};
   // Normalised innovation squared of the newest correction per degree of freedom, NaN: none yet.
   Scalar cable_nis = std::numeric_limits<Scalar>::quiet_NaN();
   Scalar ground_nis = std::numeric_limits<Scalar>::quiet_NaN();  // of the feet's heights
