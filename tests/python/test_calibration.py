@@ -13,6 +13,9 @@ from typer.testing import CliRunner, Result
 from helpers.sequences import make_sequence
 from tensegrity import InputError, PrismEstimator, calibration, estimate, robots
 from tensegrity.calibration import RobotCalibration, calibrate_robot
+from tensegrity.calibration.evidence import Evidence
+from tensegrity.calibration.mounting import Mounting, find_mounting
+from tensegrity.calibration.offsets import find_offsets
 from tensegrity.cli import app
 from tensegrity.robots import Robot
 from tensegrity.robots.mounting import imu_rotation
@@ -79,6 +82,65 @@ def test_errors_of_a_slow_roll_are_recovered(slow_roll: Sequence) -> None:
     assert np.all(calibrated.cable_offset_std < calibration.robot.OFFSET_STD_M)
 
     assert endcap_error(slow_roll, robot) < endcap_error(slow_roll, slow_roll.robot) / 2
+
+
+# --- the method, on recordings whose answer is known exactly -------------------------------------
+
+
+@dataclasses.dataclass
+class LinearRecording:
+    """Measures ``y = H offsets + noise`` of unit variance, by a Kalman filter with the prior
+    standard deviation ``prior_std``; its misfit is quadratic in the mounting, block by block."""
+
+    h: np.ndarray
+    y: np.ndarray
+    prior_std: float = 0.01
+    best: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros((1, 3)))  # of each block
+
+    def replay(self, mounting: np.ndarray, expected_offsets: np.ndarray) -> Evidence:
+        prior = np.eye(9) / self.prior_std**2
+        offsets = np.linalg.solve(
+            prior + self.h.T @ self.h, prior @ expected_offsets + self.h.T @ self.y
+        )
+        misfit = 1e5 * ((mounting - self.best) ** 2).sum(axis=1)
+        return Evidence(misfit, offsets, trajectory=None)  # type: ignore[arg-type]
+
+
+def test_offsets_of_several_recordings_are_those_of_all_measurements_together() -> None:
+    rng = np.random.default_rng(0)
+    truth = rng.normal(0, 0.01, 9)
+    # The first recording sees six combinations, the second six others: some are seen by both.
+    hs = [150 * rng.normal(size=(6, 9)) for _ in range(2)]
+    ys = [h @ truth + rng.normal(size=6) for h in hs]
+    known = Mounting(np.zeros(3), np.zeros((3, 3)), 1.0, [np.zeros((9, 3))] * 2)
+    recordings = [LinearRecording(h, y) for h, y in zip(hs, ys, strict=True)]
+    expected = np.full(9, 0.001)
+    found = find_offsets(recordings, known, expected, 0.01, lambda: None)  # type: ignore[arg-type]
+    h, y, prior = np.vstack(hs), np.hstack(ys), np.eye(9) / 0.01**2
+    covariance = np.linalg.inv(prior + h.T @ h)
+    np.testing.assert_allclose(found.covariance, covariance, rtol=1e-6, atol=1e-10)
+    np.testing.assert_allclose(found.estimate, covariance @ (prior @ expected + h.T @ y), atol=1e-8)
+
+
+def test_what_no_recording_sees_keeps_the_prior() -> None:
+    blind = LinearRecording(np.zeros((1, 9)), np.zeros(1))
+    slopes = np.zeros((9, 3))
+    known = Mounting(np.zeros(3), np.zeros((3, 3)), 5.0, [slopes])
+    found = find_offsets([blind], known, np.zeros(9), 0.01, lambda: None)  # type: ignore[list-item]
+    np.testing.assert_allclose(found.estimate, np.zeros(9), atol=1e-12)
+    np.testing.assert_allclose(found.covariance, 0.01**2 * np.eye(9), rtol=1e-9)
+
+
+def test_mounting_is_the_minimum_over_all_blocks() -> None:
+    best = np.array([0.04, 0.03, -0.02]) + np.random.default_rng(1).normal(0, 0.004, (40, 3))
+    whole = LinearRecording(np.zeros((1, 9)), np.zeros(1), best=best)
+    halves = [dataclasses.replace(whole, best=part) for part in (best[:25], best[25:])]
+    for recordings in ([whole], halves):
+        found = find_mounting(recordings, np.array([0.02, 0, 0]), np.zeros(9), lambda: None)  # type: ignore[arg-type]
+        np.testing.assert_allclose(found.estimate, best.mean(axis=0), atol=1e-4)
+        scatter = np.std(best, axis=0, ddof=3) / np.sqrt(len(best))
+        expected = np.hypot(scatter, [0.003, 0, 0])  # feet that slip, see the module
+        np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), expected, rtol=0.05)
 
 
 # --- what is refused ----------------------------------------------------------------------------
