@@ -17,6 +17,7 @@ from tensegrity.sequence import read
 FloatArray = NDArray[np.float64]
 
 ROD_LENGTH = 1.45  # [m]
+SUREST = 4.0  # greatest log odds of one geometry, so that sensors can outvote it
 
 
 def share_of_weight(world: FloatArray, feet: NDArray[np.intp]) -> FloatArray:
@@ -33,7 +34,8 @@ def log_odds(world: FloatArray, p: _core.ContactDetectorParameters) -> FloatArra
     intercept = np.empty(6)
     intercept[order] = np.array(p.intercept)[[0, 1, 2, 2, 2, 2]]
     height = world[:, 2] - world[:, 2].min()
-    return intercept + p.height_weight * height / ROD_LENGTH + p.share_weight * shares
+    odds = intercept + p.height_weight * height / ROD_LENGTH + p.share_weight * shares
+    return odds.clip(-SUREST, SUREST)
 
 
 def filtered(
@@ -73,6 +75,8 @@ def test_detector_is_the_two_state_filter() -> None:
         np.testing.assert_array_equal(flags, np.array(detector.probability) > 0.5)
     expected = filtered(worlds, intervals, p)
     assert expected.std() > 0.2
+    bounded = np.abs([log_odds(world, p) for world in worlds]) == SUREST
+    assert 0.1 < bounded.mean() < 0.9
     np.testing.assert_allclose(actual, expected, atol=1e-9)
 
 
