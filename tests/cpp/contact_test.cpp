@@ -16,6 +16,7 @@ using tensegrity::contact::barycentric;
 using tensegrity::contact::Detector;
 using tensegrity::contact::load_share;
 using tensegrity::contact::lowest_first;
+using tensegrity::contact::support_shares;
 
 using Flags = std::array<bool, 6>;
 constexpr Flags kFace035{{true, false, false, true, false, true}};
@@ -79,6 +80,73 @@ TEST_CASE("endcaps are ordered by height, ties by number") {
   CHECK(lowest_first(q) == std::array<int, 6>{{3, 1, 5, 0, 2, 4}});
 }
 
+TEST_CASE("known feet share the weight so that its moments are in equilibrium") {
+  std::mt19937 random(7);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Endcaps<double> q = scattered<double>(random);
+    const std::array<int, 6> order = lowest_first(q);
+    const Vector<double, 2> centre = q.topRows<2>().rowwise().mean();
+    for (std::size_t feet = 0; feet <= 6; ++feet) {
+      // Any feet: the last `feet` of the order, so that higher ones are among them.
+      Flags loaded{};
+      for (std::size_t k = 6 - feet; k < 6; ++k) loaded[std::size_t(order[k])] = true;
+      const double no_least = -std::numeric_limits<double>::infinity();
+      const std::array<double, 6> share = support_shares(q, loaded, no_least);
+
+      double sum = 0;
+      Vector<double, 2> moment = Vector<double, 2>::Zero();  // turned by 90 degrees
+      std::size_t standing = 0;
+      for (std::size_t i = 0; i < 6; ++i) {
+        if (!loaded[i]) CHECK(share[i] == 0);
+        if (share[i] != 0) ++standing;
+        sum += share[i];
+        moment += share[i] * (q.col(Eigen::Index(i)).head<2>() - centre);
+      }
+      if (feet == 0) {
+        CHECK(sum == 0);
+        continue;
+      }
+      CHECK(sum == doctest::Approx(1));
+      CHECK(standing <= 3);
+      // Of more than three the lowest three.
+      for (std::size_t k = 6 - feet + 3; k < 6; ++k) CHECK(share[std::size_t(order[k])] == 0);
+      if (feet == 1) CHECK(share[std::size_t(order[5])] == 1);
+      if (feet == 2) {  // a lever balances along itself
+        const Vector<double, 2> lever = (q.col(order[5]) - q.col(order[4])).head<2>().normalized();
+        CHECK(std::abs(lever.dot(moment)) < 1e-9);
+      }
+      if (feet >= 3 && share[std::size_t(order[6 - feet])] != 1.0 / 3) {  // no degenerate triangle
+        CHECK(moment.norm() < 1e-9);
+      }
+    }
+  }
+}
+
+TEST_CASE("no foot carries less than the least share, and the rest keep their ratio") {
+  std::mt19937 random(9);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Endcaps<double> q = scattered<double>(random);
+    const std::array<int, 6> order = lowest_first(q);
+    Flags loaded{};
+    for (std::size_t k = 0; k < 3; ++k) loaded[std::size_t(order[k])] = true;
+    const Vector3<double> free = load_share(q, order);
+    const Vector3<double> bounded = free.cwiseMax(0.01);
+    const std::array<double, 6> share = support_shares(q, loaded, 0.01);
+    for (std::size_t k = 0; k < 3; ++k) {
+      CHECK(share[std::size_t(order[k])] ==
+            doctest::Approx(bounded[Eigen::Index(k)] / bounded.sum()));
+    }
+  }
+}
+
+TEST_CASE("two feet on top of each other still share the whole weight") {
+  Endcaps<double> q = on_face_035<double>();
+  q.col(3).head<2>() = q.col(0).head<2>();
+  const std::array<double, 6> share =
+      support_shares(q, Flags{{true, false, false, true, false, false}}, 0.01);
+  CHECK(share[0] + share[3] == doctest::Approx(1));
+}
+
 TEST_CASE_TEMPLATE("a robot at rest on a face stands on exactly its three feet", Scalar, double,
                    float) {
   const Endcaps<Scalar> q = on_face_035<Scalar>();
@@ -102,7 +170,8 @@ TEST_CASE_TEMPLATE("an endcap lifted off the ground is let go, at any rate of up
 
   const auto release = [&](Scalar dt) {  // [s]
     Detector<Scalar> detector{Prism<Scalar>()};
-    while (detector.probability()[5] < Scalar(0.99)) detector.update(down, dt);
+    for (Scalar standing = 0; standing < 1; standing += dt) detector.update(down, dt);
+    REQUIRE(detector.loaded()[5]);
     Scalar time = 0;
     while (detector.update(up, dt)[5] && time < 1) time += dt;
     return time;
@@ -181,4 +250,34 @@ TEST_CASE("after a reset a detector is as new") {
   const Endcaps<double> q = scattered<double>(random);
   CHECK(used.update(q, 0.01) == fresh.update(q, 0.01));
   CHECK(used.probability() == fresh.probability());
+}
+
+TEST_CASE("contact sensors are evidence: their odds add up, and enough of them outvote geometry") {
+  const double log_odds = std::log(9.0);  // wrong in 10 %
+  const auto odds = [](double p) { return std::log(p / (1 - p)); };
+  Detector<double> detector{Prism<double>()};
+  const Endcaps<double> q = on_face_035<double>();
+  detector.update(q, 0.01);
+  const auto before = detector.probability();
+  const Flags wrong{{false, true, false, true, false, true}};
+  detector.measure(wrong, log_odds);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double added = odds(detector.probability()[i]) - odds(before[i]);
+    CHECK(added == doctest::Approx(wrong[i] ? log_odds : -log_odds));
+    CHECK(detector.loaded()[i] == (detector.probability()[i] > 0.5));
+  }
+  for (int k = 0; k < 20; ++k) {
+    detector.update(q, 0.005);
+    detector.measure(wrong, log_odds);
+  }
+  CHECK(detector.loaded() == wrong);
+  // One sensor that lies now and then does not.
+  detector.reset();
+  for (int k = 0; k < 400; ++k) {
+    detector.update(q, 0.005);
+    Flags flags = kFace035;
+    if (k % 10 == 9) flags[0] = false;
+    detector.measure(flags, log_odds);
+    if (k > 20) REQUIRE(detector.loaded() == kFace035);
+  }
 }

@@ -114,3 +114,21 @@ TEST_CASE_TEMPLATE("derivatives of Gamma_1 b and Gamma_2 b", Scalar, double, flo
     }
   }
 }
+
+TEST_CASE_TEMPLATE("shortest_rotation takes one vector to the other and spins about neither",
+                   Scalar, double, float) {
+  using V3 = tensegrity::Vector3<Scalar>;
+  using M3 = tensegrity::Matrix3<Scalar>;
+  const Scalar tolerance = 20 * std::numeric_limits<Scalar>::epsilon();
+  const V3 from = V3(Scalar(0.3), Scalar(-0.7), Scalar(0.5)).normalized();
+  const V3 across = from.unitOrthogonal();
+  for (const double angle : {0.0, 1e-9, 1e-4, 0.3, 1.6, 3.0, 3.1415926535897931}) {
+    const V3 to = (std::cos(Scalar(angle)) * from + std::sin(Scalar(angle)) * across).normalized();
+    const M3 r = tensegrity::shortest_rotation<Scalar>(from, to);
+    // Below its smallest angle it is the identity, so much is left.
+    CHECK((r * from - to).norm() < tolerance + Scalar(1.1e-6));
+    CHECK((r * r.transpose() - M3::Identity()).norm() < tolerance);
+    CHECK(r.determinant() > 0);
+    CHECK((r.trace() - 1) / 2 == doctest::Approx(std::cos(angle)).epsilon(1e-5));
+  }
+}
