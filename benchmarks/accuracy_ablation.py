@@ -1,14 +1,16 @@
 """What each part of the estimator is worth: ``full`` with one part at a time switched off.
 
 Every row is a matter of configuration alone, so that anyone can repeat it on a recording of their
-own. Rows and what they leave out:
+own. Some parts pay only where something is wrong: combine ``--ablation`` with ``--variants
+nominal cable-offsets-5mm wrong-contacts``. Rows and what they leave out:
 
 * *feet never slip*: friction's likelihood. Every foot on the ground is one that stands still.
 * *no cable offsets*: constant errors of the cable sensors are taken as zero.
 * *fixed process noise*: the other rods' endcaps are as free at rest as at full activity.
 * *flags taken as truth*: contact flags outvote the detector at once. Without flags in the
   recording, the same as ``full``.
-* *terrain unknown*: the ground may rise and tilt on the way.
+* *terrain unknown*: the ground may rise and tilt on the way. (A variant that declares its terrain
+  declares it here too.)
 * *loosely coupled*: the shape is tracked by itself and then corrects the pose, with all else that
   improves on T: estimated spin, rolling endcaps, contact noise from the shape.
 * *paper*: the method of T as published.

@@ -17,12 +17,13 @@ endcap_radius: 0.030   # m
 robot = robots.load("robot.yaml")
 print(f"{robot.name}: rods of {robot.rod_length} m, {len(robot.cables)} cables")
 
-# Cable lengths with 5 mm of noise, and an IMU that gives instantaneous values.
+# An IMU that gives instantaneous values, ground that slopes, cable lengths with 5 mm of noise.
 Path("filter.yaml").write_text(
     """\
 base: full
 settings:
   imu_sampling: instantaneous
+  terrain: slope
 noises:
   cable_std: 0.005       # m
 """
