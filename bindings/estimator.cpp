@@ -146,7 +146,7 @@ class Recorder {
     counter("shape_failures", &PrismHealth::shape_failures);
     counter("contacts_rejected", &PrismHealth::contacts_rejected);
     counter("cables_rejected", &PrismHealth::cables_rejected);
-    counter("shape_resets", &PrismHealth::shape_resets);
+    counter("spin_resets", &PrismHealth::spin_resets);
     counter("velocity_resets", &PrismHealth::velocity_resets);
     counter("terrain_mismatches", &PrismHealth::terrain_mismatches);
     out["health"] = health;
@@ -335,7 +335,7 @@ void bind_estimator(py::module_& m) {
       .def_readonly("shape_failures", &PrismHealth::shape_failures)
       .def_readonly("contacts_rejected", &PrismHealth::contacts_rejected)
       .def_readonly("cables_rejected", &PrismHealth::cables_rejected)
-      .def_readonly("shape_resets", &PrismHealth::shape_resets)
+      .def_readonly("spin_resets", &PrismHealth::spin_resets)
       .def_readonly("velocity_resets", &PrismHealth::velocity_resets)
       .def_readonly("terrain_mismatches", &PrismHealth::terrain_mismatches);
 

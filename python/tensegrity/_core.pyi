@@ -650,7 +650,7 @@ class PrismHealth:
     def shape_failures(self) -> int:
         ...
     @property
-    def shape_resets(self) -> int:
+    def spin_resets(self) -> int:
         ...
     @property
     def terrain_mismatches(self) -> int:
@@ -708,6 +708,11 @@ class PrismState:
     @property
     def initialized(self) -> bool:
         ...
+    @property
+    def load_shares(self) -> typing.Annotated[list[float], "FixedSize(6)"]:
+        """
+        share of the weight each contact carries, six numbers that sum to 1
+        """
     @property
     def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """

@@ -1,6 +1,9 @@
 // Feet as measurements: slip and height, and their rows against finite differences.
 #include <doctest/doctest.h>
 
+#include <cmath>
+#include <limits>
+
 #include "tensegrity/tight/feet.hpp"
 #include "tight_samples.hpp"
 
@@ -22,16 +25,20 @@ VectorXd dense(const Row<double>& row) {
   return h;
 }
 
+constexpr double kUnmeasured = std::numeric_limits<double>::quiet_NaN();
+
 // Velocity of the point of a sphere that touches a plane with normal n, from the definition: the
-// angular velocity of its rod is that of its direction, and along the rod that of the base rod.
-V3 touching_velocity(const B& belief, int endcap, const Prism<double>& robot, const V3& n) {
+// angular velocity of its rod is that of its direction, and along the rod the measured spin, or
+// else that of the base rod.
+V3 touching_velocity(const B& belief, int endcap, const Prism<double>& robot, const V3& n,
+                     double spin) {
   V3 omega = belief.rotation * belief.rate;
   if (endcap >= 2) {
     const int even = endcap / 2 * 2;
     const V3 u = (belief.endcap(even) - belief.endcap(even + 1)).normalized();
     const V3 u_rate =
         (belief.endcap_velocity(even) - belief.endcap_velocity(even + 1)) / robot.rod_length;
-    omega = u.cross(u_rate) + u * u.dot(omega);
+    omega = u.cross(u_rate) + u * (std::isnan(spin) ? u.dot(omega) : spin);
   }
   return belief.endcap_velocity(endcap) + omega.cross(-robot.endcap_radius * n);
 }
@@ -45,8 +52,10 @@ TEST_CASE("feet: the slip is that of the touching point of a rolling sphere") {
     const B belief = samples.belief(robot);
     const V3 n = belief.ground_normal();
     for (int endcap = 0; endcap < 6; ++endcap) {
-      const Foot<double> foot(belief, endcap, robot.endcap_radius, robot.rod_length, n);
-      CHECK((foot.slip() - touching_velocity(belief, endcap, robot, n)).norm() < 1e-12);
+      for (const double spin : {kUnmeasured, 0.0, 1.7}) {
+        const Foot<double> foot(belief, endcap, robot.endcap_radius, robot.rod_length, n, spin);
+        CHECK((foot.slip() - touching_velocity(belief, endcap, robot, n, spin)).norm() < 1e-12);
+      }
     }
   }
 }
@@ -56,7 +65,8 @@ TEST_CASE("feet: the slip is that of the touching point of a rolling sphere") {
 // error while n does not, and that the rod's direction u is uncertain. To first order
 //   ds = row + xi_R x s + r Omega x (xi_R x n)
 //        - r [(du x turn) x n + (du . Omega_0) u x n + (u . Omega_0) du x n],
-// du the part across u of (xi_a - xi_b) / |q_a - q_b|, Omega_0 the base rod's rate.
+// du the part across u of (xi_a - xi_b) / |q_a - q_b|, Omega_0 the base rod's rate. Of a rod whose
+// spin is measured that stands for u . Omega_0, and does not depend on du.
 TEST_CASE("feet: rows of the slip are its derivative but for rolling's dependence on direction") {
   const Prism<double> robot;
   const double r = robot.endcap_radius;
@@ -66,9 +76,11 @@ TEST_CASE("feet: rows of the slip are its derivative but for rolling's dependenc
     const V3 n = belief.ground_normal();
     const V3 base_rate = belief.rotation * belief.rate;
     for (int endcap = 0; endcap < 6; ++endcap) {
-      const Foot<double> foot(belief, endcap, r, robot.rod_length, n);
-      const MatrixXd numeric = derivative(
-          belief, [&](const B& b) { return VectorXd(touching_velocity(b, endcap, robot, n)); });
+      const double spin = samples.uniform(0, 1) < 0.5 ? kUnmeasured : samples.normal();
+      const Foot<double> foot(belief, endcap, r, robot.rod_length, n, spin);
+      const MatrixXd numeric = derivative(belief, [&](const B& b) {
+        return VectorXd(touching_velocity(b, endcap, robot, n, spin));
+      });
 
       V3 omega = base_rate;
       MatrixXd left_out = MatrixXd::Zero(3, B::Dim);
@@ -78,9 +90,11 @@ TEST_CASE("feet: rows of the slip are its derivative but for rolling's dependenc
         const V3 u = span.normalized();
         const V3 turn =
             (belief.endcap_velocity(even) - belief.endcap_velocity(even + 1)) / robot.rod_length;
-        omega = u.cross(turn) + u * u.dot(base_rate);
-        const M3 by_direction = -r * (hat(n) * hat(turn) + u.cross(n) * base_rate.transpose() -
-                                      u.dot(base_rate) * hat(n));
+        const bool measured = !std::isnan(spin);
+        const double about_itself = measured ? spin : u.dot(base_rate);
+        omega = u.cross(turn) + u * about_itself;
+        M3 by_direction = -r * (hat(n) * hat(turn) - about_itself * hat(n));
+        if (!measured) by_direction -= r * u.cross(n) * base_rate.transpose();
         const M3 across = (M3::Identity() - u * u.transpose()) / span.norm();
         left_out.middleCols<3>(B::endcap_index(even)) = by_direction * across;
         left_out.middleCols<3>(B::endcap_index(even + 1)) = -by_direction * across;

@@ -13,7 +13,7 @@ _EVENTS = {
     "shape_failures": "cable samples that no shape of this robot fits",
     "contacts_rejected": "corrections by contacts refused, the feet stand anew",
     "cables_rejected": "single cable lengths refused: check that sensor",
-    "shape_resets": "times the shape was lost and found again",
+    "spin_resets": "times the spin of the shape could not be true and was widened",
     "velocity_resets": "times the velocity could not be true and was widened",
     "terrain_mismatches": "the ground was declared flat but slopes: set 'settings.terrain: slope'",
 }

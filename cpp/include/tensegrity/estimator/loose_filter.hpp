@@ -37,7 +37,11 @@ class LooseFilter {
   using Flags = std::array<bool, 6>;
 
   LooseFilter(const Prism<Scalar>& robot, const PrismConfig<Scalar>& config)
-      : robot_(robot), config_(config), solver_(robot), tracker_(robot), detector_(robot) {
+      : robot_(robot),
+        config_(config),
+        solver_(robot, solver_options()),
+        tracker_(robot),
+        detector_(robot) {
     for (int contacts = 1; contacts <= MaxContacts; ++contacts) {
       gates_[std::size_t(contacts)] =
           config.chi_square_gate > 0
@@ -146,6 +150,14 @@ class LooseFilter {
   const Belief& belief() const { return belief_; }
 
  private:
+  // The last step of a quadratic convergence is a tenth of a millimetre, the error left after it
+  // far less: cables are good to millimetres.
+  static shape::SolverOptions<Scalar> solver_options() {
+    shape::SolverOptions<Scalar> options;
+    options.tolerance = Scalar(1e-4);
+    return options;
+  }
+
   bool reset_shape(const CableLengths<Scalar>& lengths) {
     solver_.reset();
     if (!used(solver_.solve(lengths))) return false;

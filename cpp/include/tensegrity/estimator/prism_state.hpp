@@ -11,15 +11,15 @@ namespace tensegrity {
 
 // Counters since construction. A healthy run has zeros, apart from what its sensors lost.
 struct PrismHealth {
-  std::uint32_t imu_dropped = 0;         // not finite, out of range, duplicated or out of order
-  std::uint32_t imu_gaps = 0;            // steps longer than `max_imu_gap`
-  std::uint32_t cables_dropped = 0;      // not finite, out of range, out of order or too late
-  std::uint32_t contacts_dropped = 0;    // out of order or too late
-  std::uint32_t shape_failures = 0;      // lengths that no shape of this robot fits
-  std::uint32_t contacts_rejected = 0;   // corrections that failed the chi-square gate
-  std::uint32_t cables_rejected = 0;     // single lengths that failed the filter's gate
-  std::uint32_t shape_resets = 0;        // endcaps that were lost and placed anew
-  std::uint32_t velocity_resets = 0;     // velocities that could not be true, and were widened
+  std::uint32_t imu_dropped = 0;        // not finite, out of range, duplicated or out of order
+  std::uint32_t imu_gaps = 0;           // steps longer than `max_imu_gap`
+  std::uint32_t cables_dropped = 0;     // not finite, out of range, out of order or too late
+  std::uint32_t contacts_dropped = 0;   // out of order or too late
+  std::uint32_t shape_failures = 0;     // lengths that no shape of this robot fits
+  std::uint32_t contacts_rejected = 0;  // corrections that failed the chi-square gate
+  std::uint32_t cables_rejected = 0;    // single lengths that failed the filter's gate
+  std::uint32_t spin_resets = 0;      // spins of the shape that could not be true, and were widened
+  std::uint32_t velocity_resets = 0;  // velocities that could not be true, and were widened
   std::uint32_t terrain_mismatches = 0;  // ground declared flat that turned out to slope
 };
 

@@ -73,15 +73,15 @@ class TightFilter {
 
   // Lengths [m], NaN where a cable was not measured.
   Status correct_cables(const CableLengths<Scalar>& lengths, Scalar, PrismHealth& health) {
-    const auto result =
-        tight::correct_cables(belief_, lengths, config_.cable_std, square(config_.cable_gate));
+    // With a cable missing there is no redundancy left to tell a wrong sensor from a wrong shape.
+    complete_ = lengths.allFinite() ? complete_ + 1 : 0;
+    const Scalar gate = complete_ > 0 ? square(config_.cable_gate) : Scalar(0);
+    const auto result = tight::correct_cables(belief_, lengths, config_.cable_std, gate);
     tight::hold_rods(belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
     if (++cable_samples_ % kFoldEvery == 0) {
       tight::hold_fold(belief_, robot_, kFoldThreshold, kFoldStd);
     }
     health.cables_rejected += std::uint32_t(result.rejected);
-    cables_lost_ = result.rejected > result.accepted ? cables_lost_ + 1 : 0;
-    if (lengths.allFinite()) last_lengths_ = lengths;
     if (result.accepted > 0) cable_nis_ = result.chi_square / Scalar(result.accepted);
     return result.accepted > 0 ? Status::kOk : Status::kRejected;
   }
@@ -174,7 +174,6 @@ class TightFilter {
     }
     tight::hold_rods(belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
     detector_.reset();
-    last_lengths_ = rest.lengths;
     started_ = true;
     return true;
   }
@@ -193,6 +192,7 @@ class TightFilter {
     p.diagonal().template head<Belief::kPosition>().setOnes();
     p.diagonal().template segment<3>(Belief::kPosition).setConstant(before);
     tight::place_endcaps(belief_, h, kLostShapeStd, kLostSpinStd, Scalar(1));
+    loaded_.fill(false);
     detector_.reset();
   }
 
@@ -293,13 +293,16 @@ class TightFilter {
   //  - every foot slides fast although nothing shakes the robot: the velocity is wrong (a fall can
   //    leave it so, and sure of itself). It is widened.
   void watch(Scalar dt, PrismHealth& health) {
+    // A net with a cable missing bends where it likes: its feet prove nothing.
+    if (complete_ < kCompleteSamples) return;
     off_ground_ =
         worst_height_ > kLostHeight ? off_ground_ + dt : std::max(off_ground_ - dt, Scalar(0));
-    if (off_ground_ > kLostTime || cables_lost_ >= kLostSamples) {
+    since_spin_reset_ += dt;
+    if (off_ground_ > kLostTime && since_spin_reset_ > kSpinRest) {
       off_ground_ = 0;
-      cables_lost_ = 0;
-      place_anew();
-      ++health.shape_resets;
+      since_spin_reset_ = 0;
+      tight::widen_spin(belief_, kLostSpin);
+      ++health.spin_resets;
     }
     if (config_.terrain == Terrain::kFlat && !terrain_opened_ &&
         belief_.ground.template tail<2>().norm() > kSlopeNoticed) {
@@ -316,19 +319,6 @@ class TightFilter {
       tight::widen_velocity(belief_, kImpossibleSlip);
       ++health.velocity_resets;
     }
-  }
-
-  void place_anew() {
-    Endcaps<Scalar> h = belief_.endcaps_body();
-    Scalar spin_variance = square(kLostSpinStd);
-    solver_.reset();
-    if (used(solver_.solve(last_lengths_ - belief_.offsets))) {
-      const SpinStart<Scalar> spin = stand(solver_.endcaps(), loaded_);
-      h = spun(solver_.endcaps(), spin.angle);
-      if (spin.found) spin_variance = spin.variance;
-    }
-    tight::place_endcaps(belief_, h, kPlacedShapeStd, std::sqrt(spin_variance), kPlacedRateStd);
-    tight::hold_rods(belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
   }
 
   // phi from the endcaps that are on the ground. The ground may slope.
@@ -349,7 +339,7 @@ class TightFilter {
   static constexpr Scalar kImpossibleSlip = Scalar(0.5);
   static constexpr Scalar kLostTime = Scalar(0.3);
   static constexpr Scalar kWatchedShare = Scalar(0.15);
-  static constexpr int kLostSamples = 10;  // in a row with most cables rejected
+  static constexpr int kCompleteSamples = 100;
   // Turns of a rod below this have no measured direction [rad/s]; at full activity the
   // inclination from its accelerometer is this uncertain [1].
   static constexpr Scalar kLeastTurn = Scalar(0.2);
@@ -357,9 +347,9 @@ class TightFilter {
   // Level floors: 10 mm over 4 m is the tolerance of DIN 18202.
   static constexpr Scalar kFlatSlopeStd = Scalar(0.0025);
   static constexpr Scalar kSlopeNoticed = Scalar(5) * kFlatSlopeStd;
-  // Endcaps placed anew in motion [m], [m/s].
-  static constexpr Scalar kPlacedShapeStd = Scalar(0.05);
-  static constexpr Scalar kPlacedRateStd = Scalar(0.5);
+  static constexpr Scalar kLostSpin = Scalar(0.3);  // [rad]
+  static constexpr Scalar kSpinRest =
+      Scalar(5);  // until the next one: it needs a while to settle [s]
   // After a long gap [m], [rad].
   static constexpr Scalar kLostShapeStd = Scalar(0.3);
   static constexpr Scalar kLostSpinStd = Scalar(1);
@@ -385,10 +375,10 @@ class TightFilter {
   Flags flags_{}, loaded_{};
   bool flags_are_new_ = false, started_ = false;
   int cable_samples_ = 0;
-  CableLengths<Scalar> last_lengths_ = CableLengths<Scalar>::Zero();
   Scalar worst_height_ = 0, slowest_foot_ = 0;  // of the last step [m], [m/s]
   Scalar off_ground_ = 0, sliding_ = 0;         // for how long [s]
-  int cables_lost_ = 0;                         // samples in a row
+  Scalar since_spin_reset_ = kSpinRest;         // [s]
+  int complete_ = 0;                            // samples of all nine cables in a row
   bool terrain_opened_ = false;
   Scalar cable_nis_ = std::numeric_limits<Scalar>::quiet_NaN();
   Scalar ground_nis_ = std::numeric_limits<Scalar>::quiet_NaN();

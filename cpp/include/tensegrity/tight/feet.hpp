@@ -66,7 +66,7 @@ class Foot {
   int even_;
   bool base_;
   V3 slip_;
-  M3 by_even_ = M3::Zero(), by_odd_ = M3::Zero(), by_gyro_bias_;
+  M3 by_even_ = M3::Zero(), by_odd_ = M3::Zero(), by_gyro_bias_ = M3::Zero();
 };
 
 // Height of a touching endcap above the ground plane, along (-m1, -m2, 1): zero [m].

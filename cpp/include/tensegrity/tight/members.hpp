@@ -18,31 +18,43 @@ struct CableResult {
 };
 
 // `lengths`: distances of endcap centres [m], NaN for a cable without a measurement. A length whose
-// squared innovation exceeds `gate` times its variance is left out (0: never).
+// squared innovation exceeds `gate` times its variance is left out (0: never), for it is the sensor
+// that is wrong; unless more than `kMostOutliers` are, for then it is the state.
+inline constexpr int kMostOutliers = 2;
+
 template <typename Scalar>
 CableResult<Scalar> correct_cables(Belief<Scalar>& belief, const CableLengths<Scalar>& lengths,
                                    Scalar std, Scalar gate) {
   using B = Belief<Scalar>;
   CableResult<Scalar> result;
   SequentialUpdate<Scalar> update(belief);
-  for (int k = 0; k < 9; ++k) {
-    if (!std::isfinite(lengths[k])) continue;
+  std::array<int, 9> outliers;
+  int count = 0;
+  const auto correct = [&](int k, Scalar limit) {
     const Cable cable = kPrismCables[std::size_t(k)];
     const Vector3<Scalar> span = belief.endcap(cable.from) - belief.endcap(cable.to);
     const Scalar length = span.norm();
-    if (!(length > 0)) continue;
+    if (!(length > 0)) return;
     Row<Scalar> row;
     row.add(B::endcap_index(cable.from), span / length);
     row.add(B::endcap_index(cable.to), -span / length);
     row.add_single(B::kOffsets + k, Scalar(1));
     const Scalar chi_square =
-        update.correct(row, length + belief.offsets[k] - lengths[k], std * std, gate);
-    if (gate > 0 && !(chi_square <= gate)) {
-      ++result.rejected;
+        update.correct(row, length + belief.offsets[k] - lengths[k], std * std, limit);
+    if (limit > 0 && !(chi_square <= limit)) {
+      outliers[std::size_t(count++)] = k;
     } else {
       result.chi_square += chi_square;
       ++result.accepted;
     }
+  };
+  for (int k = 0; k < 9; ++k) {
+    if (std::isfinite(lengths[k])) correct(k, gate);
+  }
+  if (count > kMostOutliers) {
+    for (int k = 0; k < count; ++k) correct(outliers[std::size_t(k)], Scalar(0));
+  } else {
+    result.rejected = count;
   }
   return result;
 }

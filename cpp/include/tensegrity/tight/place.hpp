@@ -46,6 +46,20 @@ void place_endcaps(Belief<Scalar>& belief, const Endcaps<Scalar>& h, Scalar posi
   p.diagonal().template segment<12>(B::kRates).array() += rate_std * rate_std;
 }
 
+// Adds an independent spin of the other rods about the base rod, of `std` [rad], to what is
+// unknown.
+template <typename Scalar>
+void widen_spin(Belief<Scalar>& belief, Scalar std) {
+  using B = Belief<Scalar>;
+  Vector<Scalar, 12> turn;
+  for (int i = 2; i < 6; ++i) {
+    turn.template segment<3>(3 * (i - 2)) =
+        std * belief.rotation.col(2).cross(belief.endcap(i) - belief.position());
+  }
+  belief.covariance.template block<12, 12>(B::kEndcaps, B::kEndcaps) +=
+      turn.lazyProduct(turn.transpose());
+}
+
 // Adds an independent velocity of the whole robot, of `std` [m/s] per axis, to what is unknown.
 template <typename Scalar>
 void widen_velocity(Belief<Scalar>& belief, Scalar std) {

@@ -56,25 +56,38 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   const M3 accel_to_position = -dt2 * (start * gamma.g2);
 
   auto& p = belief.covariance;
-  const auto add = [&](int to, int from, const M3& m) {
-    for (int k = 0; k < 3; ++k) {
-      p.col(to + k) +=
-          m(k, 0) * p.col(from) + m(k, 1) * p.col(from + 1) + m(k, 2) * p.col(from + 2);
-    }
+  // Rows `to` of F P get m times rows `from`; where a row is both, it is a target last.
+  struct Term {
+    int to, from;
+    M3 m;
   };
+  std::array<Term, 15> terms;
+  std::size_t count = 0;
+  const auto add = [&](int to, int from, const M3& m) { terms[count++] = {to, from, m}; };
+  add(B::kPosition, B::kRotation, gx * (dt / 2));
+  add(B::kPosition, B::kGyroBias, gyro_to[1]);
+  add(B::kPosition, B::kAccelBias, accel_to_position);
+  add(B::kVelocity, B::kRotation, gx);
+  add(B::kVelocity, B::kGyroBias, gyro_to[0]);
+  add(B::kVelocity, B::kAccelBias, -int_r);
+  for (int c = 2; c < B::kColumns; ++c) {
+    add(B::column_index(c), B::kGyroBias, gyro_to[std::size_t(c)]);
+  }
+  add(B::kRotation, B::kGyroBias, -int_r);
   for (int side = 0; side < 2; ++side) {
     p.template middleCols<3>(B::kPosition) += dt * p.template middleCols<3>(B::kVelocity);
-    add(B::kPosition, B::kRotation, gx * (dt / 2));
-    add(B::kPosition, B::kGyroBias, gyro_to[1]);
-    add(B::kPosition, B::kAccelBias, accel_to_position);
-    add(B::kVelocity, B::kRotation, gx);
-    add(B::kVelocity, B::kGyroBias, gyro_to[0]);
-    add(B::kVelocity, B::kAccelBias, -int_r);
     p.template middleCols<12>(B::kEndcaps) += dt * p.template middleCols<12>(B::kRates);
-    for (int c = 2; c < B::kColumns; ++c) {
-      add(B::column_index(c), B::kGyroBias, gyro_to[std::size_t(c)]);
+    for (const Term& term : terms) {
+      Scalar* target = p.col(term.to).data();
+      const Scalar* source = p.col(term.from).data();
+      const M3& m = term.m;
+      for (int i = 0; i < B::Dim; ++i) {  // three columns from three: what is loaded is used thrice
+        const Scalar a0 = source[i], a1 = source[i + B::Dim], a2 = source[i + 2 * B::Dim];
+        target[i] += m(0, 0) * a0 + m(0, 1) * a1 + m(0, 2) * a2;
+        target[i + B::Dim] += m(1, 0) * a0 + m(1, 1) * a1 + m(1, 2) * a2;
+        target[i + 2 * B::Dim] += m(2, 0) * a0 + m(2, 1) * a1 + m(2, 2) * a2;
+      }
     }
-    add(B::kRotation, B::kGyroBias, -int_r);
     p.transposeInPlace();
   }
 
@@ -108,7 +121,11 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   walk(B::kGyroBias, 3, noise.gyro_bias);
   walk(B::kAccelBias, 3, noise.accel_bias);
   walk(B::kGround, 1, noise.ground_height);
-  walk(B::kGround + 1, 2, noise.ground_slope);
+  // The slope changes about where the robot is: z = m_0 + m_1 x + m_2 y stays there.
+  Matrix<Scalar, 3, 2> tilt;
+  tilt << -x(0, 1), -x(1, 1), 1, 0, 0, 1;
+  p.template block<3, 3>(B::kGround, B::kGround) +=
+      (noise.ground_slope * noise.ground_slope * dt) * tilt.lazyProduct(tilt.transpose());
 }
 
 }  // namespace tensegrity::tight

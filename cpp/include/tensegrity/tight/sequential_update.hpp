@@ -71,6 +71,9 @@ class Row {
   Scalar single_ = 0;
 };
 
+// Within the batch every row counts in full, so that the mean is that of the joint update; what a
+// row does not inform of is left out of the downdate at the end.
+//
 // The downdates of P wait until the end as columns g of P - sum g g': P is then read and written
 // once for all rows instead of once for each.
 template <typename Scalar>
@@ -100,9 +103,10 @@ class SequentialUpdate {
     const Scalar chi_square = y * y / s;
     if (!std::isfinite(chi_square) || (gate > 0 && chi_square > gate)) return chi_square;
     error_ += (y / s) * cross;
-    if (information > 0) {
+    if (information >= 0) {  // also one that informs of nothing stands in the joint gain
       if (waiting_ == kCapacity) downdate();
-      gains_.col(waiting_++) = std::sqrt(information / s) * cross;
+      applied_[std::size_t(waiting_)] = std::sqrt(information);
+      gains_.col(waiting_++) = cross / std::sqrt(s);
     }
     return chi_square;
   }
@@ -110,18 +114,28 @@ class SequentialUpdate {
  private:
   static constexpr int kCapacity = 12;  // of three feet, and of nine cables
 
+  // Two columns of P against four of the gains at a time: what is loaded is used twice.
   void downdate() {
-    auto& p = belief_.covariance;
-    const auto& g = gains_;
+    for (int k = 0; k < waiting_; ++k) gains_.col(k) *= applied_[std::size_t(k)];
     int k = 0;
     for (; k + 4 <= waiting_; k += 4) {
-      for (int j = 0; j < B::Dim; ++j) {
-        p.col(j) -= g(j, k) * g.col(k) + g(j, k + 1) * g.col(k + 1) + g(j, k + 2) * g.col(k + 2) +
-                    g(j, k + 3) * g.col(k + 3);
+      const Scalar* g = gains_.col(k).data();
+      for (int j = 0; j < B::Dim; j += 2) {
+        const auto a = gains_.template block<1, 4>(j, k).eval();
+        const auto b = gains_.template block<1, 4>(j + 1, k).eval();
+        Scalar* p = belief_.covariance.col(j).data();
+        for (int i = 0; i < B::Dim; ++i) {
+          const Scalar g0 = g[i], g1 = g[i + B::Dim], g2 = g[i + 2 * B::Dim],
+                       g3 = g[i + 3 * B::Dim];
+          p[i] -= a[0] * g0 + a[1] * g1 + a[2] * g2 + a[3] * g3;
+          p[i + B::Dim] -= b[0] * g0 + b[1] * g1 + b[2] * g2 + b[3] * g3;
+        }
       }
     }
     for (; k < waiting_; ++k) {
-      for (int j = 0; j < B::Dim; ++j) p.col(j) -= g(j, k) * g.col(k);
+      for (int j = 0; j < B::Dim; ++j) {
+        belief_.covariance.col(j) -= gains_(j, k) * gains_.col(k);
+      }
     }
     waiting_ = 0;
   }
@@ -129,6 +143,7 @@ class SequentialUpdate {
   B& belief_;
   typename B::ErrorVector error_ = B::ErrorVector::Zero();
   Matrix<Scalar, B::Dim, kCapacity> gains_;
+  std::array<Scalar, kCapacity> applied_{};  // square root of the part of each that informs
   int waiting_ = 0;
 };
 
