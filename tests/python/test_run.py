@@ -163,7 +163,7 @@ def break_line(file: Path, number: int, old: str, new: str) -> None:
 def test_a_broken_configuration_is_located(run_path: Path) -> None:
     file = run_path / "config.yaml"
     line = next(i for i, text in enumerate(file.read_text().split("\n"), 1) if "cable_std" in text)
-    break_line(file, line, "0.002", "-1")
+    break_line(file, line, "0.0035", "-1")
     with pytest.raises(InputError, match=r"a number > 0 \[m\], got -1") as caught:
         read_run(run_path)
     assert (caught.value.file, caught.value.line) == (file, line)
