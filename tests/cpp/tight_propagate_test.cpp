@@ -89,7 +89,10 @@ TEST_CASE("noise: P is the covariance of many noisy runs") {
       belief.gyro_bias += samples.vector(noise.gyro_bias * std::sqrt(dt));
       belief.accel_bias += samples.vector(noise.accel_bias * std::sqrt(dt));
       belief.ground[0] += noise.ground_height * std::sqrt(dt) * samples.normal();
-      belief.ground.tail<2>() += samples.normal(2, noise.ground_slope * std::sqrt(dt));
+      // The slope turns about the point below the robot.
+      const Eigen::Vector2d turned = samples.normal(2, noise.ground_slope * std::sqrt(dt));
+      belief.ground.tail<2>() += turned;
+      belief.ground[0] -= turned.dot(belief.position().head<2>());
     }
     const VectorXd e = moving(difference(belief, reference));
     sum += e.lazyProduct(e.transpose());
