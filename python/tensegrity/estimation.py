@@ -16,15 +16,13 @@ from tensegrity.robots import Robot
 from tensegrity.robots import load as load_robot
 from tensegrity.robots.mounting import imu_rotation
 from tensegrity.sequence import Sequence
+from tensegrity.sequence.sequence import ROD_IMUS
 from tensegrity.trajectory import Trajectory
 
 Progress = Callable[[float], None]
 
 RodImu = tuple[SupportsInt | SupportsIndex, ArrayLike, ArrayLike, ArrayLike]
 """Number of the rod (1: r23, 2: r45), stamps [ns], rates [rad/s], specific forces [m/s^2]."""
-
-ROD_IMUS = ("r23", "r45")
-"""Names of the IMUs on the other rods in a recording: their files are ``imu_<name>.csv``."""
 
 
 class PrismEstimator(_core.PrismEstimator):

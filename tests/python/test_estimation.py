@@ -12,9 +12,10 @@ import tensegrity
 import tensegrity._core as _core
 from helpers.sequences import make_sequence
 from tensegrity import FilterConfig, InputError, PrismEstimator, estimate, robots
-from tensegrity.estimation import ROD_IMUS, core_config, core_robot
+from tensegrity.estimation import core_config, core_robot
 from tensegrity.evaluation import Metrics, evaluate
 from tensegrity.sequence import CableStream, ContactStream, Sequence
+from tensegrity.sequence.sequence import ROD_IMUS
 from tensegrity.trajectory import Trajectory
 
 METHODS = ("paper", "full")

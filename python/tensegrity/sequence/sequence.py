@@ -15,6 +15,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
+ROD_IMUS = ("r23", "r45")
+"""Names of the IMUs on the other rods in a recording: their files are ``imu_<name>.csv``."""
+
 
 @dataclass(frozen=True)
 class ImuStream:

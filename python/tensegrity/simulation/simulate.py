@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from tensegrity.errors import InputError
 from tensegrity.robots import Robot, load
 from tensegrity.robots.mounting import imu_rotation
-from tensegrity.sequence.sequence import EndcapStream, PoseStream, Sequence
+from tensegrity.sequence.sequence import ROD_IMUS, EndcapStream, PoseStream, Sequence
 from tensegrity.simulation.failures import lost_cable_index, with_gaps, without_lost_cable
 from tensegrity.simulation.gait import FACES, Gait
 from tensegrity.simulation.manoeuvres import Manoeuvre
@@ -103,8 +103,7 @@ def simulate_with_forces(
     _stand(log, options.still_end)
     recording = _recording(f"{manoeuvre}-{options.seed}", log, options, draw.imu_turns, sensor_rngs)
     assert recording.groundtruth is not None
-    samples = slice(IMU_STEPS, IMU_STEPS * (len(recording.groundtruth.t_ns) + 1), IMU_STEPS)
-    return recording, log.normal_forces()[samples]
+    return recording, log.normal_forces()[_at_samples(len(recording.groundtruth.t_ns))]
 
 
 def _variant(robot: Robot, options: SimulationOptions) -> Robot:
@@ -220,6 +219,11 @@ def _come_to_rest(log: StateLog) -> None:
         log.step()
 
 
+def _at_samples(count: int) -> slice:
+    """The steps of a log at which the IMU's ``count`` samples are stamped."""
+    return slice(IMU_STEPS, IMU_STEPS * (count + 1), IMU_STEPS)
+
+
 def _recording(
     name: str,
     log: StateLog,
@@ -249,7 +253,7 @@ def _recording(
         endcaps[:, first] = rod.position + half_axis
         endcaps[:, second] = rod.position - half_axis
     endcaps = endcaps[since_start]
-    at_samples = slice(IMU_STEPS, end, IMU_STEPS)
+    at_samples = _at_samples(len(t_ns))
     return Sequence(
         name=name,
         robot=robot,
@@ -262,8 +266,5 @@ def _recording(
             quaternion=frames[0].rotation[at_samples].as_quat(),
         ),
         endcaps=EndcapStream(t_ns=stamps(len(t_ns), IMU_PERIOD_S), position=endcaps[::IMU_STEPS]),
-        other_imus={
-            f"r{first}{second}": imu
-            for (first, second), imu in zip(robot.rods[1:], others, strict=False)
-        },
+        other_imus=dict(zip(ROD_IMUS, others, strict=False)),
     )

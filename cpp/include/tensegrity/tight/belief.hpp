@@ -1,11 +1,10 @@
 // What the tightly coupled filter knows: the base rod as a rigid body, and the endcaps of the other
 // two rods as points with velocities, all in the world and in one group.
 //
-// Mean:  X = (R, v, p, q_2 .. q_5, w_2 .. w_5) in SE_10(3) with R body to world, v and p of the
-// IMU,
-//        q_i the centre of endcap i and w_i its velocity; Euclidean part theta = (b_g, b_a, o, m)
-//        with o the constant errors of the cable sensors and m = (height, slope x, slope y) of the
-//        ground plane z = m_0 + m_1 x + m_2 y.
+// Mean:  X = (R, v, p, q_2 .. q_5, w_2 .. w_5) in SE_10(3) with R body to world, v and p those of
+//        the IMU, q_i the centre of endcap i and w_i its velocity; Euclidean part
+//        theta = (b_g, b_a, o, m) with o the constant errors of the cable sensors and m = (height,
+//        slope x, slope y) of the ground plane z = m_0 + m_1 x + m_2 y.
 // Error: right-invariant, Xbar X^-1 = exp(xi) and thetabar - theta.
 //
 // A net of rods and cables measures distances only. In this error the distance of two endcaps does
