@@ -63,7 +63,8 @@ Vector3<Scalar> load_share(const Endcaps<Scalar>& world, const std::array<int, 6
 // endcaps without load have zero.
 template <typename Scalar>
 std::array<Scalar, 6> support_shares(const Endcaps<Scalar>& world,
-                                     const std::array<bool, 6>& loaded, Scalar least) {
+                                     const std::array<bool, 6>& loaded,
+                                     Scalar least = Scalar(0.01)) {
   std::array<int, 6> feet{};
   std::size_t count = 0;
   for (const int endcap : lowest_first(world)) {

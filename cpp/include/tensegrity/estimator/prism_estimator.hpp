@@ -129,7 +129,7 @@ class PrismEstimator {
     s.health = health_;
     if (!initialized_) return s;
     filter_.describe(s);
-    s.load_shares = contact::support_shares(s.endcaps_world, s.contacts, kLeastLoad);
+    s.load_shares = contact::support_shares(s.endcaps_world, s.contacts);
     return s;
   }
 
@@ -141,7 +141,6 @@ class PrismEstimator {
   static constexpr Scalar kPriorSigmas = Scalar(5);
   static constexpr Scalar kUniform = Scalar(0.2886751);   // 1/sqrt(12)
   static constexpr Scalar kLongestBridge = Scalar(1);     // [s]
-  static constexpr Scalar kLeastLoad = Scalar(0.01);      // share of a contact
   static constexpr Scalar kLargestRate = Scalar(200);     // [rad/s], no gyro reaches it
   static constexpr Scalar kLargestForce = Scalar(20000);  // [m/s^2], 2000 g
 

@@ -11,6 +11,7 @@
 // to tell feet that stand from feet that slide (tight/friction.hpp).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -74,7 +75,7 @@ class TightFilter {
   // Lengths [m], NaN where a cable was not measured.
   Status correct_cables(const CableLengths<Scalar>& lengths, Scalar, PrismHealth& health) {
     // With a cable missing there is no redundancy left to tell a wrong sensor from a wrong shape.
-    complete_ = lengths.allFinite() ? complete_ + 1 : 0;
+    complete_ = lengths.allFinite() ? std::min(complete_ + 1, kCompleteSamples) : 0;
     const Scalar gate = complete_ > 0 ? square(config_.cable_gate) : Scalar(0);
     const auto result = tight::correct_cables(belief_, lengths, config_.cable_std, gate);
     tight::hold_rods(belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
@@ -154,7 +155,7 @@ class TightFilter {
         .template segment<2>(Belief::kGround + 1)
         .setConstant(square(flat ? kFlatSlopeStd : config_.ground_slope_std));
 
-    const SpinStart<Scalar> spin = stand(solver_.endcaps(), flags_);
+    const SpinStart<Scalar> spin = stand(solver_.endcaps());
     const Endcaps<Scalar> h = spun(solver_.endcaps(), spin.angle);
     belief_.columns(2, 1) = robot_.endcap_radius - (belief_.rotation * h).row(2).minCoeff();
     tight::place_endcaps(belief_, h, kStartShapeStd, std::sqrt(spin.variance),
@@ -260,8 +261,7 @@ class TightFilter {
   }
 
   void correct_feet(const Endcaps<Scalar>& world, Scalar dt) {
-    const std::array<Scalar, 6> shares =
-        contact::support_shares(world, loaded_, Scalar(kLeastLoad));
+    const std::array<Scalar, 6> shares = contact::support_shares(world, loaded_);
     const tight::FootNoise<Scalar> noise{config_.creep_std,       config_.slip_length,
                                          config_.slip_speed,      config_.foot_rise_std,
                                          config_.foot_height_std, config_.friction};
@@ -322,9 +322,9 @@ class TightFilter {
   }
 
   // phi from the endcaps that are on the ground. The ground may slope.
-  SpinStart<Scalar> stand(const Endcaps<Scalar>& q, const Flags& feet) const {
+  SpinStart<Scalar> stand(const Endcaps<Scalar>& q) const {
     const Scalar slope = config_.terrain == Terrain::kFlat ? Scalar(0) : config_.ground_slope_std;
-    SpinStart<Scalar> spin = find_spin(q, V3(belief_.rotation.transpose() * V3::UnitZ()), feet,
+    SpinStart<Scalar> spin = find_spin(q, V3(belief_.rotation.transpose() * V3::UnitZ()), flags_,
                                        std::hypot(kStartShapeStd, slope * robot_.rod_length / 2));
     if (!spin.found) spin.variance = square(config_.spin_prior_std);
     return spin;
@@ -361,8 +361,6 @@ class TightFilter {
   static constexpr int kFoldEvery = 4;
   static constexpr Scalar kFoldThreshold = Scalar(0.1);
   static constexpr Scalar kFoldStd = Scalar(0.2);
-  // Least share of the weight that a loaded foot is taken to carry.
-  static constexpr Scalar kLeastLoad = Scalar(0.01);
 
   Prism<Scalar> robot_;
   PrismConfig<Scalar> config_;

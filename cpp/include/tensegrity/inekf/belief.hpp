@@ -12,6 +12,7 @@
 #include <array>
 #include <cmath>
 
+#include "tensegrity/inekf/column_covariance.hpp"
 #include "tensegrity/math/so3.hpp"
 
 namespace tensegrity::inekf {
@@ -95,19 +96,15 @@ struct Belief {
 
   // Covariance of the position error p - pbar in the world [m^2]. The invariant error mixes in the
   // rotation: dp = xi_p - p x xi_R.
-  Matrix3<Scalar> position_covariance() const { return column_covariance(position, kPosition); }
-  Matrix3<Scalar> velocity_covariance() const { return column_covariance(velocity, kVelocity); }
+  Matrix3<Scalar> position_covariance() const {
+    return column_covariance(covariance, position, kPosition);
+  }
+  Matrix3<Scalar> velocity_covariance() const {
+    return column_covariance(covariance, velocity, kVelocity);
+  }
   // Covariance of the rotation error in the world frame [rad^2].
   Matrix3<Scalar> rotation_covariance() const {
     return covariance.template block<3, 3>(kRotation, kRotation);
-  }
-
- private:
-  Matrix3<Scalar> column_covariance(const Vector3<Scalar>& column, int at) const {
-    const Matrix3<Scalar> c = hat(column);
-    const Matrix3<Scalar> cross = covariance.template block<3, 3>(at, kRotation) * c.transpose();
-    return covariance.template block<3, 3>(at, at) - cross - cross.transpose() +
-           c * rotation_covariance() * c.transpose();
   }
 };
 

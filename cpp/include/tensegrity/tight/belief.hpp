@@ -13,6 +13,7 @@
 // body frame. Rods 23 and 45 keep their length by a measurement (members.hpp).
 #pragma once
 
+#include "tensegrity/inekf/column_covariance.hpp"
 #include "tensegrity/math/so3.hpp"
 #include "tensegrity/robot/prism.hpp"
 
@@ -108,8 +109,12 @@ struct Belief {
   }
 
   // Covariances of errors in the world frame: of a column x it is xi_x + xi_R x x.
-  M3 position_covariance() const { return column_covariance(position(), kPosition); }
-  M3 velocity_covariance() const { return column_covariance(velocity(), kVelocity); }
+  M3 position_covariance() const {
+    return inekf::column_covariance(covariance, position(), kPosition);
+  }
+  M3 velocity_covariance() const {
+    return inekf::column_covariance(covariance, velocity(), kVelocity);
+  }
   M3 rotation_covariance() const { return covariance.template block<3, 3>(kRotation, kRotation); }
   // Joint covariance of the endcaps in the body frame [m^2], q stacked by endcap. An error of
   // R' (q_i - p) is R' (xi_q - xi_p) up to the rotation, which leaves the body frame.
@@ -127,14 +132,6 @@ struct Belief {
       }
     }
     return out;
-  }
-
- private:
-  M3 column_covariance(const V3& column, int at) const {
-    const M3 c = hat(column);
-    const M3 cross = covariance.template block<3, 3>(at, kRotation) * c.transpose();
-    return covariance.template block<3, 3>(at, at) - cross - cross.transpose() +
-           c * rotation_covariance() * c.transpose();
   }
 };
 

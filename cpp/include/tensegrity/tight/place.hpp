@@ -6,6 +6,20 @@
 
 namespace tensegrity::tight {
 
+// Adds an independent spin of the other rods about the base rod, of `std` [rad], to what is
+// unknown.
+template <typename Scalar>
+void widen_spin(Belief<Scalar>& belief, Scalar std) {
+  using B = Belief<Scalar>;
+  Vector<Scalar, 12> turn;
+  for (int i = 2; i < 6; ++i) {
+    turn.template segment<3>(3 * (i - 2)) =
+        std * belief.rotation.col(2).cross(belief.endcap(i) - belief.position());
+  }
+  belief.covariance.template block<12, 12>(B::kEndcaps, B::kEndcaps) +=
+      turn.lazyProduct(turn.transpose());
+}
+
 // Replaces endcaps 2 .. 5 and their velocities by those of the rigid shape `h` (body [m]). Their
 // errors become those of the base rod plus, independent of everything else, `position_std` [m] of
 // each endcap, `spin_std` [rad] of the shape about the base rod, and `rate_std` [m/s].
@@ -35,29 +49,9 @@ void place_endcaps(Belief<Scalar>& belief, const Endcaps<Scalar>& h, Scalar posi
   };
   derive(p);
   derive(p.transpose());
-  for (int i = 2; i < 6; ++i) {
-    const V3 turn_i = spin_std * rotation * V3::UnitZ().cross(V3(h.col(i)));
-    for (int j = 2; j < 6; ++j) {
-      const V3 turn_j = spin_std * rotation * V3::UnitZ().cross(V3(h.col(j)));
-      p.template block<3, 3>(B::endcap_index(i), B::endcap_index(j)) += turn_i * turn_j.transpose();
-    }
-  }
+  widen_spin(belief, spin_std);
   p.diagonal().template segment<12>(B::kEndcaps).array() += position_std * position_std;
   p.diagonal().template segment<12>(B::kRates).array() += rate_std * rate_std;
-}
-
-// Adds an independent spin of the other rods about the base rod, of `std` [rad], to what is
-// unknown.
-template <typename Scalar>
-void widen_spin(Belief<Scalar>& belief, Scalar std) {
-  using B = Belief<Scalar>;
-  Vector<Scalar, 12> turn;
-  for (int i = 2; i < 6; ++i) {
-    turn.template segment<3>(3 * (i - 2)) =
-        std * belief.rotation.col(2).cross(belief.endcap(i) - belief.position());
-  }
-  belief.covariance.template block<12, 12>(B::kEndcaps, B::kEndcaps) +=
-      turn.lazyProduct(turn.transpose());
 }
 
 // Adds an independent velocity of the whole robot, of `std` [m/s] per axis, to what is unknown.

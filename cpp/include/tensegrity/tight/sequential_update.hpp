@@ -82,8 +82,9 @@ class SequentialUpdate {
   using B = Belief<Scalar>;
 
   explicit SequentialUpdate(B& belief) : belief_(belief) {}
-  // Takes the collected error out of the mean.
+  // Takes the collected error out of the mean, if any row was applied.
   ~SequentialUpdate() {
+    if (waiting_ == 0) return;  // every applied row waits, also after a full batch was taken
     downdate();
     belief_.retract(error_);
   }
@@ -103,11 +104,10 @@ class SequentialUpdate {
     const Scalar chi_square = y * y / s;
     if (!std::isfinite(chi_square) || (gate > 0 && chi_square > gate)) return chi_square;
     error_ += (y / s) * cross;
-    if (information >= 0) {  // also one that informs of nothing stands in the joint gain
-      if (waiting_ == kCapacity) downdate();
-      applied_[std::size_t(waiting_)] = std::sqrt(information);
-      gains_.col(waiting_++) = cross / std::sqrt(s);
-    }
+    // Also a row that informs of nothing stands in the joint gain.
+    if (waiting_ == kCapacity) downdate();
+    applied_[std::size_t(waiting_)] = std::sqrt(information);
+    gains_.col(waiting_++) = cross / std::sqrt(s);
     return chi_square;
   }
 

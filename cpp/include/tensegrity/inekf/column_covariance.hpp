@@ -1,0 +1,19 @@
+// From the right-invariant error of a column of the group to its error in the world.
+#pragma once
+
+#include "tensegrity/math/so3.hpp"
+
+namespace tensegrity::inekf {
+
+// Covariance of the world error of a column x (a velocity or a position) whose invariant error xi_x
+// starts at `at` of `covariance`, with that of the rotation first: dx = xi_x - x x xi_R.
+template <typename Covariance, typename Column>
+auto column_covariance(const Covariance& covariance, const Column& column, int at) {
+  using M3 = Matrix3<typename Covariance::Scalar>;
+  const M3 c = hat(column);
+  const M3 cross = covariance.template block<3, 3>(at, 0) * c.transpose();
+  return M3(covariance.template block<3, 3>(at, at) - cross - cross.transpose() +
+            c * covariance.template block<3, 3>(0, 0) * c.transpose());
+}
+
+}  // namespace tensegrity::inekf
