@@ -67,7 +67,9 @@ void bind_inekf(py::module_& m) {
           "retract",
           [](Belief& b, const Eigen::VectorXd& e) {
             if (e.size() != b.dim()) throw py::value_error("error vector: wrong length");
-            b.retract(e);
+            Belief::ErrorVector error = Belief::ErrorVector::Zero();
+            error.head(e.size()) = e;
+            b.retract(error);
           },
           py::arg("error"), "Takes an error (16 + 3 N,) out of the mean: X <- Exp(-xi) X.")
       .def(
@@ -106,8 +108,8 @@ void bind_inekf(py::module_& m) {
           "correct_contacts",
           [](Belief& b, const Eigen::Matrix<double, 6, 3>& h, const Matrix<double, 18>& covariance,
              double gate) {
-            const auto z = inekf::contact_innovation(b, spun_kinematics(h, covariance));
-            const inekf::Correction c = inekf::correct(b, z, gate);
+            const inekf::Correction c =
+                inekf::correct_contacts(b, spun_kinematics(h, covariance), gate);
             return py::make_tuple(c.status, c.chi_square);
           },
           py::arg("h"), py::arg("covariance"), py::arg("gate") = 0.0,

@@ -31,8 +31,9 @@ CableLengths<double> lengths_of(const B& belief) {
 }
 
 void correct_by_shape(B& belief, const CableLengths<double>& lengths) {
-  tensegrity::tight::correct_cables(belief, lengths, 0.002, 36.0);
-  tensegrity::tight::hold_rods(belief, kRobot.rod_length, 0.0005, 0.002);
+  SequentialUpdate<double> update(belief);
+  tensegrity::tight::correct_cables(update, belief, lengths, 0.002, 36.0);
+  tensegrity::tight::hold_rods(update, belief, kRobot.rod_length, 0.0005, 0.002);
 }
 
 void correct_by_ground(B& belief) {

@@ -14,6 +14,7 @@ using tensegrity::Cable;
 using tensegrity::CableLengths;
 using tensegrity::kPrismCables;
 using tensegrity::Prism;
+using tensegrity::tight::SequentialUpdate;
 
 constexpr int kSeeds = 20;
 
@@ -32,6 +33,11 @@ CableLengths<double> lengths_of(const B& belief) {
     lengths[k] = (belief.endcap(cable.from) - belief.endcap(cable.to)).norm() + belief.offsets[k];
   }
   return lengths;
+}
+
+auto cables(B& belief, const CableLengths<double>& measured, double std, double gate) {
+  SequentialUpdate<double> update(belief);
+  return tensegrity::tight::correct_cables(update, belief, measured, std, gate);
 }
 
 }  // namespace
@@ -64,7 +70,7 @@ TEST_CASE("cable lengths: any subset corrects like a joint update with differenc
     }
     const B expected = dense_update(prior, h, z, VectorXd::Constant(rows, std * std));
     B belief = prior;
-    const auto result = tensegrity::tight::correct_cables(belief, measured, std, 0.0);
+    const auto result = cables(belief, measured, std, 0.0);
     CHECK(result.accepted == rows);
     CHECK(result.rejected == 0);
     check_same(belief, expected);
@@ -80,10 +86,10 @@ TEST_CASE("a cable beyond the gate is left out, the others are not") {
   CableLengths<double> without = measured;
   without[4] = std::numeric_limits<double>::quiet_NaN();
   B gated = prior, reference = prior;
-  const auto result = tensegrity::tight::correct_cables(gated, measured, 0.002, 25.0);
+  const auto result = cables(gated, measured, 0.002, 25.0);
   CHECK(result.rejected == 1);
   CHECK(result.accepted == 8);
-  tensegrity::tight::correct_cables(reference, without, 0.002, 0.0);
+  cables(reference, without, 0.002, 0.0);
   CHECK(gated.columns == reference.columns);
   CHECK(gated.covariance == reference.covariance);
 }
@@ -107,7 +113,10 @@ TEST_CASE("rods: length and stretch correct like a joint update with differenced
     const Eigen::Vector4d stds(length_std, stretch_std, length_std, stretch_std);
     const B expected = dense_update(prior, derivative(prior, rods), rods(prior), stds.cwiseAbs2());
     B belief = prior;
-    tensegrity::tight::hold_rods(belief, robot.rod_length, length_std, stretch_std);
+    {
+      SequentialUpdate<double> update(belief);
+      tensegrity::tight::hold_rods(update, belief, robot.rod_length, length_std, stretch_std);
+    }
     check_same(belief, expected);
   }
 }

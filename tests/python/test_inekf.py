@@ -1,8 +1,8 @@
 """The C++ filter against a dense one, written from the equations alone.
 
 The dense filter (T eqs. 4-14, biases as Hartley et al. 2020) never uses the block structure or the
-closed forms of the C++ code: means and transitions are matrix exponentials, noise is van Loan's
-integral, groups are matrices.
+closed forms of the C++ code: means and transitions are matrix exponentials, groups are matrices. The
+noise of a sample is an error of its mean, a bias of that step alone; walks are added after it.
 
 Over one sample the inputs are constant in the body frame, so the *left*-invariant error has a
 constant system matrix and scipy.linalg.expm is exact. The right-invariant error follows by the
@@ -80,28 +80,25 @@ class DenseFilter:
     def propagate(self, gyro, accel, dt):
         w, a = gyro - self.bg, accel - self.ba
         n, contacts = len(self.p), len(self.ids)
-        # Left-invariant error dynamics (Hartley et al. 2020, eq. 70) and noise densities.
+        # Left-invariant error dynamics (Hartley et al. 2020, eq. 70).
         system = np.zeros((n, n))
         system[0:3, 0:3] = system[3:6, 3:6] = system[6:9, 6:9] = -hat(w)
         system[3:6, 0:3] = -hat(a)
         system[6:9, 3:6] = np.eye(3)
         system[0:3, 9:12] = system[3:6, 12:15] = -np.eye(3)
-        density = np.zeros((n, n))
-        # A sample's noise is the mean of white noise over dt: density = variance * dt.
-        density[0:3, 0:3] = np.eye(3) * NOISE["gyro_std"] ** 2 * dt
-        density[3:6, 3:6] = np.eye(3) * NOISE["accel_std"] ** 2 * dt
-        density[9:12, 9:12] = np.eye(3) * NOISE["gyro_bias_walk"] ** 2
-        density[12:15, 12:15] = np.eye(3) * NOISE["accel_bias_walk"] ** 2
-        density[15, 15] = NOISE["spin_walk"] ** 2
+        walk = np.zeros(n)
+        walk[9:12] = NOISE["gyro_bias_walk"]
+        walk[12:15] = NOISE["accel_bias_walk"]
+        walk[15] = NOISE["spin_walk"]
         for i in range(contacts):
             s = slice(16 + 3 * i, 19 + 3 * i)
             system[s, s] = -hat(w)
-            density[s, s] = np.eye(3) * NOISE["anchor_walk"] ** 2
-        # van Loan (1978): Phi and the integral of Phi Q Phi^T from one exponential.
-        block = np.block([[-system, density], [np.zeros((n, n)), system.T]]) * dt
-        e = expm(block)
-        phi = e[n:, n:].T
-        noise = phi @ e[:n, n:]
+            walk[s] = NOISE["anchor_walk"]
+        phi = expm(system * dt)
+        by_sample = phi[:, 9:15].copy()
+        by_sample[9:15] = 0
+        variance = np.repeat([NOISE["gyro_std"] ** 2, NOISE["accel_std"] ** 2], 3)
+        noise = by_sample @ np.diag(variance) @ by_sample.T + np.diag(walk**2 * dt)
 
         left = np.linalg.inv(self.adjoint())
         p_left = phi @ (left @ self.p @ left.T) @ phi.T + noise

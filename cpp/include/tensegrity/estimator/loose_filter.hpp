@@ -194,13 +194,10 @@ class LooseFilter {
     // R (mean - b_a) + g = g x xi_R - R zeta_a + R n at rest.
     const V3 g(0, 0, -config_.gravity);
     const Matrix3<Scalar> gx = hat(g);
-    const int n = belief_.dim();
     inekf::Innovation<Belief, 3> z;
-    z.resize(n, 3);
     z.residual = belief_.rotation * force + g;
-    z.cross =
-        p.template middleCols<3>(Belief::kRotation).topRows(n) * gx.transpose() -
-        p.template middleCols<3>(Belief::kAccelBias).topRows(n) * belief_.rotation.transpose();
+    z.cross = p.template middleCols<3>(Belief::kRotation) * gx.transpose() -
+              p.template middleCols<3>(Belief::kAccelBias) * belief_.rotation.transpose();
     z.covariance = gx * z.cross.template middleRows<3>(Belief::kRotation) -
                    belief_.rotation * z.cross.template middleRows<3>(Belief::kAccelBias);
     z.covariance.diagonal().array() +=
@@ -288,9 +285,8 @@ class LooseFilter {
 
   Status correct_contacts(PrismHealth& health) {
     if (belief_.anchor_count == 0) return Status::kOk;
-    const auto innovation = inekf::contact_innovation(belief_, kinematics());
     const Scalar gate = gates_[std::size_t(belief_.anchor_count)];
-    const inekf::Correction correction = inekf::correct(belief_, innovation, gate);
+    const inekf::Correction correction = inekf::correct_contacts(belief_, kinematics(), gate);
     if (correction.status == Status::kRejected) {
       // The feet are not where they stood. They stand anew where the kinematics puts them.
       ++health.contacts_rejected;
@@ -317,10 +313,13 @@ class LooseFilter {
 
   // Anchors are added together with a fresh shape, so that both are of the same instant.
   void update_contacts() {
-    release_anchors();
+    const auto is_new = [&](int id) { return flags_[std::size_t(id)] && belief_.find(id) < 0; };
+    bool any = false;
+    for (int id = 0; id < 6; ++id) any = any || is_new(id);
+    if (!any) return;
     const auto k = kinematics();
     for (int id = 0; id < 6; ++id) {
-      if (flags_[std::size_t(id)] && belief_.find(id) < 0) {
+      if (is_new(id)) {
         inekf::augment(belief_, id, V3(k.h.col(id)),
                        Matrix<Scalar, 3, 1>(k.h_extra.template middleRows<3>(3 * id)),
                        Matrix3<Scalar>(k.covariance.template block<3, 3>(3 * id, 3 * id)));

@@ -77,8 +77,12 @@ class TightFilter {
     // With a cable missing there is no redundancy left to tell a wrong sensor from a wrong shape.
     complete_ = lengths.allFinite() ? std::min(complete_ + 1, kCompleteSamples) : 0;
     const Scalar gate = complete_ > 0 ? square(config_.cable_gate) : Scalar(0);
-    const auto result = tight::correct_cables(belief_, lengths, config_.cable_std, gate);
-    tight::hold_rods(belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
+    tight::CableResult<Scalar> result;
+    {
+      tight::SequentialUpdate<Scalar> update(belief_);
+      result = tight::correct_cables(update, belief_, lengths, config_.cable_std, gate);
+      tight::hold_rods(update, belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
+    }
     if (++cable_samples_ % kFoldEvery == 0) {
       tight::hold_fold(belief_, robot_, kFoldThreshold, kFoldStd);
     }
@@ -173,7 +177,10 @@ class TightFilter {
         update.correct(row, z[k], square(config_.accelerometer_std) / Scalar(rest.samples));
       }
     }
-    tight::hold_rods(belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
+    {
+      tight::SequentialUpdate<Scalar> update(belief_);
+      tight::hold_rods(update, belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
+    }
     detector_.reset();
     started_ = true;
     return true;

@@ -43,6 +43,8 @@ void marginalise(B& belief, int slot) {
   const int at = B::anchor_index(slot);
   for (int i = at; i + 3 < n; ++i) p.row(i).head(n) = p.row(i + 3).head(n);
   for (int j = at; j + 3 < n; ++j) p.col(j).head(n) = p.col(j + 3).head(n);
+  p.template middleRows<3>(n - 3).setZero();
+  p.template middleCols<3>(n - 3).setZero();
   for (int i = slot; i + 1 < belief.anchor_count; ++i) {
     belief.anchors.col(i) = belief.anchors.col(i + 1);
     belief.anchor_ids[i] = belief.anchor_ids[i + 1];

@@ -14,6 +14,7 @@
 
 #include "tensegrity/inekf/column_covariance.hpp"
 #include "tensegrity/math/so3.hpp"
+#include "tensegrity/math/symmetric.hpp"
 
 namespace tensegrity::inekf {
 
@@ -33,10 +34,9 @@ struct Belief {
   static constexpr int kAnchors = 15 + Extra;
   static constexpr int MaxDim = kAnchors + 3 * MaxAnchors;
 
-  // Only the leading dim() x dim() block is meaningful.
-  using Covariance = Matrix<Scalar, MaxDim>;
-  // Capacity-bounded, so that products of active blocks never touch the heap.
-  using ErrorVector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1, 0, MaxDim, 1>;
+  // Only the leading dim() x dim() block is meaningful, the rest is zero.
+  using Covariance = Matrix<Scalar, padded(MaxDim)>;
+  using ErrorVector = Vector<Scalar, padded(MaxDim)>;
 
   Matrix3<Scalar> rotation = Matrix3<Scalar>::Identity();  // R, body to world
   Vector3<Scalar> velocity = Vector3<Scalar>::Zero();      // v, world [m/s]
@@ -61,8 +61,7 @@ struct Belief {
   }
 
   // X <- Exp(-xi) X, theta <- theta - zeta: takes an estimated error e out of the mean (T eq. 13).
-  template <typename Derived>
-  void retract(const Eigen::MatrixBase<Derived>& e) {
+  void retract(const ErrorVector& e) {
     const Gamma<Scalar> gamma(-e.template segment<3>(kRotation));
     const auto move = [&](auto&& column, int at) {
       column = (gamma.g0 * column - gamma.g1 * e.template segment<3>(at)).eval();
@@ -74,17 +73,6 @@ struct Belief {
     gyro_bias -= e.template segment<3>(kGyroBias);
     accel_bias -= e.template segment<3>(kAccelBias);
     extra -= e.template segment<Extra>(kExtra);
-  }
-
-  // Rounding makes the two triangles differ; the mean of them is the covariance.
-  void symmetrize() {
-    const int n = dim();
-    for (int j = 0; j < n; ++j) {
-      for (int i = 0; i < j; ++i) {
-        const Scalar mean = (covariance(i, j) + covariance(j, i)) / 2;
-        covariance(i, j) = covariance(j, i) = mean;
-      }
-    }
   }
 
   bool finite() const {

@@ -5,6 +5,8 @@
 //   z_i = xi_p - xi_di + R (dh_i/d extra) zeta_extra + R n_i.
 #pragma once
 
+#include <type_traits>
+
 #include "tensegrity/inekf/correct.hpp"
 
 namespace tensegrity::inekf {
@@ -18,41 +20,54 @@ struct Kinematics {
 };
 
 // All anchored endcaps in one measurement: their errors are correlated through the shape.
-template <typename B, int N, typename Scalar = typename B::Scalar>
-Innovation<B, 3 * B::MaxAnchors> contact_innovation(const B& belief,
-                                                    const Kinematics<Scalar, N, B::Extra>& k) {
-  const int n = belief.dim();
-  const int contacts = belief.anchor_count;
-  const Matrix3<Scalar>& r = belief.rotation;
+// `Contacts` is the belief's anchor_count.
+template <int Contacts, typename B, int N, typename Scalar = typename B::Scalar>
+Innovation<B, 3 * Contacts> contact_innovation(const B& belief,
+                                               const Kinematics<Scalar, N, B::Extra>& k) {
+  using M3 = Matrix3<Scalar>;
+  const int rows = padded(belief.dim());
+  const M3& r = belief.rotation;
   const auto& p = belief.covariance;
 
-  Innovation<B, 3 * B::MaxAnchors> z;
-  z.resize(n, 3 * contacts);
-  std::array<Matrix<Scalar, 3, B::Extra>, B::MaxAnchors> f;  // R dh/d(extra)
-  for (int i = 0; i < contacts; ++i) {
-    const int id = belief.anchor_ids[i];
+  Innovation<B, 3 * Contacts> z;
+  std::array<Matrix<Scalar, 3, B::Extra>, Contacts> f;  // R dh/d(extra)
+  for (int i = 0; i < Contacts; ++i) {
+    const int id = belief.anchor_ids[std::size_t(i)];
     const int at = B::anchor_index(i);
-    f[i] = r * k.h_extra.template middleRows<3>(3 * id);
+    auto& fi = f[std::size_t(i)];
+    fi = r * k.h_extra.template middleRows<3>(3 * id);
     z.residual.template segment<3>(3 * i) =
         r * k.h.col(id) + belief.position - belief.anchors.col(i);
-    auto cross = z.cross.template middleCols<3>(3 * i);
-    cross =
-        p.template middleCols<3>(B::kPosition).topRows(n) - p.template middleCols<3>(at).topRows(n);
-    cross.noalias() += p.template middleCols<B::Extra>(B::kExtra).topRows(n) * f[i].transpose();
+    for (int c = 0; c < 3; ++c) {
+      auto cross = z.cross.col(3 * i + c).head(rows);
+      cross = p.col(B::kPosition + c).head(rows) - p.col(at + c).head(rows);
+      for (int e = 0; e < B::Extra; ++e) cross += fi(c, e) * p.col(B::kExtra + e).head(rows);
+    }
   }
-  for (int i = 0; i < contacts; ++i) {
-    const int at = B::anchor_index(i);
-    auto row = z.covariance.template middleRows<3>(3 * i);
-    row = z.cross.template middleRows<3>(B::kPosition) - z.cross.template middleRows<3>(at);
-    row.noalias() += f[i] * z.cross.template middleRows<B::Extra>(B::kExtra);
-    for (int j = 0; j < contacts; ++j) {
-      row.template middleCols<3>(3 * j) +=
-          r *
-          k.covariance.template block<3, 3>(3 * belief.anchor_ids[i], 3 * belief.anchor_ids[j]) *
-          r.transpose();
+  for (int i = 0; i < Contacts; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      const auto seen = z.cross.template middleCols<3>(3 * j);
+      const M3 noise = k.covariance.template block<3, 3>(3 * belief.anchor_ids[std::size_t(i)],
+                                                         3 * belief.anchor_ids[std::size_t(j)]);
+      z.covariance.template block<3, 3>(3 * i, 3 * j) =
+          seen.template middleRows<3>(B::kPosition) -
+          seen.template middleRows<3>(B::anchor_index(i)) +
+          f[std::size_t(i)] * seen.template middleRows<B::Extra>(B::kExtra) +
+          r * noise * r.transpose();
     }
   }
   return z;
+}
+
+// Corrects with all anchored endcaps, whose number becomes a size here. `gate`: chi-square beyond
+// which nothing happens (0: none).
+template <int Contacts = 1, typename B, int N, typename Scalar = typename B::Scalar>
+Correction correct_contacts(B& belief, const Kinematics<Scalar, N, B::Extra>& k, Scalar gate) {
+  if (belief.anchor_count == Contacts) {
+    return correct(belief, contact_innovation<Contacts>(belief, k), gate);
+  }
+  if constexpr (Contacts < B::MaxAnchors) return correct_contacts<Contacts + 1>(belief, k, gate);
+  return {};
 }
 
 }  // namespace tensegrity::inekf

@@ -1,37 +1,22 @@
 // The measurement update (T eqs. 12-14) for any linearised measurement z = H e + n.
 //
 // A measurement says what it sees through two products, P H^T and H (P H^T); the structure of H
-// stays with the model that knows it (contacts select blocks, cables will touch a few columns).
+// stays with the model that knows it (contacts select blocks).
 #pragma once
 
-#include <Eigen/Cholesky>
-
 #include "tensegrity/inekf/belief.hpp"
+#include "tensegrity/math/ldlt.hpp"
+#include "tensegrity/math/symmetric.hpp"
 
 namespace tensegrity::inekf {
 
-// Sized at run time within a fixed capacity: nothing on the heap.
-template <typename Scalar, int MaxRows>
-using BoundedVector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1, 0, MaxRows, 1>;
-template <typename Scalar, int MaxRows, int MaxCols = MaxRows>
-using BoundedMatrix =
-    Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic,
-                  (MaxRows == 1 && MaxCols != 1) ? Eigen::RowMajor : Eigen::ColMajor, MaxRows,
-                  MaxCols>;
-
-// A linearised measurement of up to MaxRows rows.
-template <typename B, int MaxRows>
+// A linearised measurement of `Rows` rows. Beyond the belief's dim() rows `cross` is zero.
+template <typename B, int Rows>
 struct Innovation {
   using Scalar = typename B::Scalar;
-  BoundedVector<Scalar, MaxRows> residual;             // z = H e + n
-  BoundedMatrix<Scalar, B::MaxDim, MaxRows> cross;     // P H^T
-  BoundedMatrix<Scalar, MaxRows, MaxRows> covariance;  // S = H P H^T + N
-
-  void resize(int dim, int rows) {
-    residual.resize(rows);
-    cross.resize(dim, rows);
-    covariance.resize(rows, rows);
-  }
+  Vector<Scalar, Rows> residual;                                 // z = H e + n
+  Matrix<Scalar, B::Covariance::RowsAtCompileTime, Rows> cross;  // P H^T
+  Matrix<Scalar, Rows> covariance;                               // S = H P H^T + N, lower triangle
 };
 
 struct Correction {
@@ -42,20 +27,18 @@ struct Correction {
 // Applies the update unless z^T S^-1 z exceeds `gate` (0: no gate). On kRejected or kNotFinite the
 // belief is as it was.
 //
-// The covariance update is Joseph's form (I - K H) P (I - K H)^T + K N K^T written with P H^T:
-// A = P - K (P H^T)^T, then A - (P H^T - K S) K^T; the last bracket is the rounding error of K.
-template <typename B, int MaxRows, typename Scalar = typename B::Scalar>
-Correction correct(B& belief, const Innovation<B, MaxRows>& innovation, Scalar gate) {
+// With S = L D L^T, y = L^-1 z and W = P H^T L^-T: e = W D^-1 y and P <- P - W D^-1 W^T.
+template <typename B, int Rows, typename Scalar = typename B::Scalar>
+Correction correct(B& belief, const Innovation<B, Rows>& innovation, Scalar gate) {
   Correction result;
-  const Eigen::LLT<BoundedMatrix<Scalar, MaxRows, MaxRows>> llt(innovation.covariance);
-  if (llt.info() != Eigen::Success) {
+  Ldlt<Scalar, Rows> factors;
+  if (!factors.factor(innovation.covariance)) {
     result.status = Status::kNotFinite;
     return result;
   }
-  const int n = belief.dim();
-  using Gain = BoundedMatrix<Scalar, B::MaxDim, MaxRows>;
-  const BoundedVector<Scalar, MaxRows> whitened = llt.matrixL().solve(innovation.residual);
-  const Scalar chi_square = whitened.squaredNorm();
+  const Vector<Scalar, Rows> y = factors.forward(innovation.residual);
+  const Vector<Scalar, Rows> weighted = factors.inverse_diagonal().cwiseProduct(y);
+  const Scalar chi_square = y.dot(weighted);
   result.chi_square = double(chi_square);
   if (!std::isfinite(chi_square)) {
     result.status = Status::kNotFinite;
@@ -65,18 +48,15 @@ Correction correct(B& belief, const Innovation<B, MaxRows>& innovation, Scalar g
     result.status = Status::kRejected;
     return result;
   }
-  // K = P H^T S^-1
-  Gain gain = innovation.cross;
-  llt.matrixU().template solveInPlace<Eigen::OnTheRight>(gain);
-  llt.matrixL().template solveInPlace<Eigen::OnTheRight>(gain);
-  const typename B::ErrorVector error = gain * innovation.residual;
-
-  auto p = belief.covariance.topLeftCorner(n, n);
-  p.noalias() -= gain * innovation.cross.transpose();
-  Gain rounding = innovation.cross;
-  rounding.noalias() -= gain * innovation.covariance;
-  p.noalias() -= rounding * gain.transpose();
-  belief.symmetrize();
+  const int rows = padded(belief.dim());
+  auto w = innovation.cross;
+  typename B::ErrorVector error = B::ErrorVector::Zero();
+  for (int j = 0; j < Rows; ++j) {
+    for (int k = 0; k < j; ++k) w.col(j).head(rows) -= factors.l(j, k) * w.col(k).head(rows);
+    error.head(rows) += weighted[j] * w.col(j).head(rows);
+  }
+  for (int j = 0; j < Rows; ++j) w.col(j).head(rows) *= std::sqrt(factors.inverse_diagonal()[j]);
+  subtract_outer(belief.covariance, w, Rows, rows);
   belief.retract(error);
   return result;
 }

@@ -1,21 +1,14 @@
-// Strapdown propagation over one IMU sample (T eqs. 4-8), discretised exactly.
+// One IMU sample: the body by strapdown integration, contact points by rolling.
 //
-// Angular velocity and specific force are taken as constant in the body frame over the sample.
-// Mean, transition matrix and noise are then integrals of that motion; T and DRIFT hold R fixed
-// over the step instead. The transition is never formed: its blocks act on the rows and then on
-// the columns of P in place.
+// The transition F = I + A is never formed. It acts on the columns of P, P F', and then on the
+// rows of the lower triangle of that.
 #pragma once
 
 #include "tensegrity/inekf/belief.hpp"
+#include "tensegrity/inekf/strapdown.hpp"
+#include "tensegrity/math/symmetric.hpp"
 
 namespace tensegrity::inekf {
-
-// One sample, with the biases still in it.
-template <typename Scalar>
-struct ImuSample {
-  Vector3<Scalar> gyro;   // mean angular velocity over the step, body [rad/s]
-  Vector3<Scalar> accel;  // mean specific force over the step, body [m/s^2]
-};
 
 // Standard deviations. White noise is that of one sample, i.e. of the mean over the step.
 template <typename Scalar>
@@ -34,124 +27,98 @@ struct Rolling {
   Scalar radius = 0;  // [m]
 };
 
-// `extra_walk`: random walk of each extra state [unit/sqrt(s)].
+// `extra_walk`: random walk of each extra state [unit/sqrt(s)]. Walks of a step are added at its
+// end.
 template <typename B, typename Scalar = typename B::Scalar>
 void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravity,
                const ProcessNoise<Scalar>& noise, const Rolling<Scalar>& rolling,
                const Vector<Scalar, B::Extra>& extra_walk) {
   using V3 = Vector3<Scalar>;
   using M3 = Matrix3<Scalar>;
-  const V3 w = imu.gyro - belief.gyro_bias;
-  const V3 a = imu.accel - belief.accel_bias;
-  const V3 g(0, 0, -gravity);
+  const ImuSample<Scalar> motion{imu.gyro - belief.gyro_bias, imu.accel - belief.accel_bias};
+  // Integral of R w: w is an eigenvector of Exp(w t).
+  const V3 turn = belief.rotation * motion.gyro * dt;
+  const Strapdown<Scalar> body =
+      integrate(belief.rotation, belief.velocity, belief.position, motion, dt, gravity);
+
+  // Contact points: d+ = d + r turn x e_z, and the touching point d - r e_z is what turns with R,
+  //   xi_d+ = xi_d + r turn x (e_z x xi_R) - int (d - r e_z) x R zeta_g
   const V3 up = V3::UnitZ();
-  const Gamma<Scalar> gamma(w * dt);
+  const bool rolls = rolling.radius > 0;
+  const M3 anchor_by_rotation = rolling.radius * hat(turn) * hat(up);
+  const int n = belief.dim(), rows = padded(n);
+  const int anchors = belief.anchor_count;
+  Matrix<Scalar, B::Covariance::RowsAtCompileTime, 3> by_gyro;  // A, columns of the gyro's bias
+  by_gyro.template topRows<B::kAnchors>().setZero();
+  by_gyro.template middleRows<3>(B::kRotation) = -body.int_r;
+  by_gyro.template middleRows<3>(B::kVelocity) = body.velocity_by_gyro;
+  by_gyro.template middleRows<3>(B::kPosition) = body.position_by_gyro;
+  for (int i = 0; i < anchors; ++i) {
+    if (rolls) belief.anchors.col(i) += rolling.radius * turn.cross(up);
+    by_gyro.template middleRows<3>(B::anchor_index(i)) =
+        body.column_by_gyro(belief.anchors.col(i) - rolling.radius * up);
+  }
+  for (int i = n; i < rows; ++i) by_gyro.row(i).setZero();
 
-  // ---- mean: R+ = R G0, v+ = v + R G1 a dt + g dt, p+ = p + v dt + R G2 a dt^2 + g dt^2/2
-  const M3 start = belief.rotation;
-  const M3 mean_rotation = start * gamma.g1;  // (1/dt) integral of R over the step
-  const V3 turn = start * w * dt;             // integral of R w: w is an eigenvector of Exp(w t)
-  belief.position += belief.velocity * dt + start * (gamma.g2 * a) * (dt * dt) + g * (dt * dt / 2);
-  belief.velocity += mean_rotation * a * dt + g * dt;
-  belief.rotation = orthonormalized<Scalar>(start * gamma.g0);
-  const V3 rolled = rolling.radius * turn.cross(up);
-  for (int i = 0; i < belief.anchor_count; ++i) belief.anchors.col(i) += rolled;
-
-  // ---- transition. Seen from the end of the step, with t the time to go:
-  //   xi_R+ = xi_R - int R          zeta_g
-  //   xi_v+ = xi_v + g x xi_R dt      - int (v+ - alpha(t)) x R zeta_g - int R   zeta_a
-  //   xi_p+ = xi_p + xi_v dt + g x xi_R dt^2/2 - int (p+ - beta(t)) x R zeta_g - int t R zeta_a
-  //   xi_d+ = xi_d + r turn x (e_z x xi_R) - int (d - r e_z) x R    zeta_g
-  // with alpha(t) and beta(t) what the specific force still adds to v and p. Their integrals are
-  // what a gyro error does to v and p through the rotation: derivatives of Gamma_1 a and Gamma_2 a.
-  const Scalar dt2 = dt * dt, dt3 = dt2 * dt, dt4 = dt3 * dt;
-  const M3 alpha_r = -dt2 * start * gamma.g1_derivative(a);
-  const M3 beta_r = -dt3 * start * gamma.g2_derivative(a);
-  const M3 int_r = mean_rotation * dt;
-  const M3 gx = hat(g);
-  const M3 v_gyro = alpha_r - hat(belief.velocity) * int_r;
-  const M3 p_gyro = beta_r - hat(belief.position) * int_r;
-  const M3 p_accel = -(start * gamma.g2) * dt2;
-  const M3 d_rotation = rolling.radius * hat(turn) * hat(up);
-  const V3 contact_offset = rolling.radius * up;
-
+  // ---- P F': every row of it
   auto& p = belief.covariance;
-  const int n = belief.dim();
-  const Scalar gyro_bias_q = noise.gyro_bias * noise.gyro_bias * dt;
-  const Scalar accel_bias_q = noise.accel_bias * noise.accel_bias * dt;
-  // A bias that walks during the step moves the rest by Phi(t) = L t + Q t^2. A third of the walk
-  // before the step and two thirds after it make the variances right; the cross terms then lack
-  // L dt / 6 (added below).
-  const auto bias_walk = [&](Scalar part) {
-    p.diagonal().template segment<3>(B::kGyroBias).array() += part * gyro_bias_q;
-    p.diagonal().template segment<3>(B::kAccelBias).array() += part * accel_bias_q;
-  };
-  // Applies the transition to the rows of a matrix; with the transpose, to its columns.
-  const auto transition = [&](auto&& m) {
-    const auto rows = [&](int at) { return m.template middleRows<3>(at); };
-    const auto bg = rows(B::kGyroBias), ba = rows(B::kAccelBias), r = rows(B::kRotation);
-    rows(B::kPosition) +=
-        dt * rows(B::kVelocity) + (dt2 / 2) * (gx * r) + p_gyro * bg + p_accel * ba;
-    rows(B::kVelocity) += dt * (gx * r) + v_gyro * bg - int_r * ba;
-    for (int i = 0; i < belief.anchor_count; ++i) {
-      const M3 d_gyro = -hat(belief.anchors.col(i) - contact_offset) * int_r;
-      rows(B::anchor_index(i)) += d_rotation * r + d_gyro * bg;
-    }
-    rows(B::kRotation) -= int_r * bg;
-  };
-  bias_walk(Scalar(1) / 3);
-  transition(p.leftCols(n));
-  transition(p.topRows(n).transpose());
-  bias_walk(Scalar(2) / 3);
-  const auto add_cross = [&](int row, int column, const M3& q) {
-    p.template block<3, 3>(row, column) += q;
-    p.template block<3, 3>(column, row) += q.transpose();
-  };
-  const M3 linear_gyro = -gyro_bias_q * dt / 6 * belief.rotation;
-  add_cross(B::kRotation, B::kGyroBias, linear_gyro);
-  add_cross(B::kVelocity, B::kGyroBias, hat(belief.velocity) * linear_gyro);
-  add_cross(B::kPosition, B::kGyroBias, hat(belief.position) * linear_gyro);
-  add_cross(B::kVelocity, B::kAccelBias, -accel_bias_q * dt / 6 * belief.rotation);
-  for (int i = 0; i < belief.anchor_count; ++i) {
-    add_cross(B::anchor_index(i), B::kGyroBias,
-              hat(belief.anchors.col(i) - contact_offset) * linear_gyro);
+  const M3& v_rotation = body.velocity_by_rotation;
+  const M3 p_rotation = v_rotation * (dt / 2);
+  add_columns(p, B::kPosition, B::kRotation, p_rotation, rows);
+  add_columns(p, B::kPosition, B::kVelocity, M3(dt * M3::Identity()), rows);
+  add_columns(p, B::kPosition, B::kAccelBias, body.position_by_accel, rows);
+  add_columns(p, B::kVelocity, B::kRotation, v_rotation, rows);
+  add_columns(p, B::kVelocity, B::kAccelBias, M3(-body.int_r), rows);
+  for (int i = 0; rolls && i < anchors; ++i) {
+    add_columns(p, B::anchor_index(i), B::kRotation, anchor_by_rotation, rows);
+  }
+  const auto by_gyro_of = [&](int at) { return M3(by_gyro.template middleRows<3>(at)); };
+  for (const int at : {B::kRotation, B::kVelocity, B::kPosition}) {
+    add_columns(p, at, B::kGyroBias, by_gyro_of(at), rows);
+  }
+  for (int i = 0; i < anchors; ++i) {
+    add_columns(p, B::anchor_index(i), B::kGyroBias, by_gyro_of(B::anchor_index(i)), rows);
   }
 
-  // ---- white noise. The gyro's enters like its bias, R R^T = I makes it independent of the
-  // rotation: with L = (I, v_x, p_x, (d - r e_z)_x) it adds s^2 dt L L^T. v and p vary over the
-  // step by alpha and beta; their mean is in L, their spread adds to the vv, vp and pp blocks.
-  const Scalar gyro_q = noise.gyro * noise.gyro * dt2;
-  const Scalar accel_q = noise.accel * noise.accel * dt2;
-  const V3 a0 = belief.rotation * a, a1 = belief.rotation * w.cross(a);
-  const V3 v_mid = belief.velocity - (a0 * (dt / 2) - a1 * (dt2 / 6));
-  const V3 p_mid = belief.position - (a0 * (dt2 / 6) - a1 * (dt3 / 12));
-  const auto add_own = [&](int i, const M3& q) { p.template block<3, 3>(i, i) += q; };
-  const M3 v_hat = hat(v_mid), p_hat = hat(p_mid);
-  const M3 spread = gyro_q * (a0.squaredNorm() * M3::Identity() - a0 * a0.transpose());
-  add_own(B::kRotation, gyro_q * M3::Identity());
-  add_cross(B::kVelocity, B::kRotation, gyro_q * v_hat);
-  add_cross(B::kPosition, B::kRotation, gyro_q * p_hat);
-  add_own(B::kVelocity, -gyro_q * v_hat * v_hat + spread * (dt2 / 12));
-  add_cross(B::kPosition, B::kVelocity, -gyro_q * p_hat * v_hat + spread * (dt3 / 24));
-  add_own(B::kPosition, -gyro_q * p_hat * p_hat + spread * (dt4 / 45));
-  for (int i = 0; i < belief.anchor_count; ++i) {
-    const M3 d_hat = hat(belief.anchors.col(i) - contact_offset);
-    const int at = B::anchor_index(i);
-    add_cross(at, B::kRotation, gyro_q * d_hat);
-    add_cross(at, B::kVelocity, -gyro_q * d_hat * v_hat);
-    add_cross(at, B::kPosition, -gyro_q * d_hat * p_hat);
-    for (int j = 0; j < i; ++j) {
-      add_cross(at, B::anchor_index(j),
-                -gyro_q * d_hat * hat(belief.anchors.col(j) - contact_offset));
+  // ---- F (P F'): rows from the diagonal on. The noise of a sample is one more error of its
+  // biases, which reaches column j of P F' as row j of A.
+  const Scalar gyro_variance = noise.gyro * noise.gyro;
+  const Scalar accel_variance = noise.accel * noise.accel;
+  for (int j = 0; j < n; ++j) {
+    Scalar* x = &p(0, j);
+    const V3 r(x[0], x[1], x[2]), v(x[3], x[4], x[5]);
+    const V3 gyro =
+        p.col(j).template segment<3>(B::kGyroBias) + gyro_variance * by_gyro.row(j).transpose();
+    V3 accel = p.col(j).template segment<3>(B::kAccelBias);
+    if (j >= B::kVelocity && j < B::kPosition) {
+      accel -= accel_variance * body.int_r.row(j - B::kVelocity).transpose();
+    } else if (j >= B::kPosition && j < B::kGyroBias) {
+      accel += accel_variance * body.position_by_accel.row(j - B::kPosition).transpose();
     }
-    add_own(at, -gyro_q * d_hat * d_hat + noise.anchor * noise.anchor * dt * M3::Identity());
+    if (j < B::kGyroBias) {
+      p.col(j).template segment<3>(B::kVelocity) += v_rotation * r - body.int_r * accel;
+      p.col(j).template segment<3>(B::kPosition) +=
+          dt * v + p_rotation * r + body.position_by_accel * accel;
+    }
+    if (rolls) {
+      const V3 rolled = anchor_by_rotation * r;
+      for (int i = 0; i < anchors; ++i) {
+        p.col(j).template segment<3>(B::anchor_index(i)) += rolled;
+      }
+    }
+    const Scalar g0 = gyro[0], g1 = gyro[1], g2 = gyro[2];
+    const Scalar *a0 = &by_gyro(0, 0), *a1 = &by_gyro(0, 1), *a2 = &by_gyro(0, 2);
+    for (int i = packet_start(j); i < rows; ++i) x[i] += a0[i] * g0 + a1[i] * g1 + a2[i] * g2;
   }
-  // The accelerometer's noise is integrated once and twice.
-  p.diagonal().template segment<3>(B::kVelocity).array() += accel_q;
-  add_cross(B::kPosition, B::kVelocity, accel_q * (dt / 2) * M3::Identity());
-  p.diagonal().template segment<3>(B::kPosition).array() += accel_q * (dt2 / 3);
-  p.diagonal().template segment<B::Extra>(B::kExtra) += extra_walk.cwiseAbs2() * dt;
-  belief.symmetrize();
+
+  const auto walk = [&](int at, int size, Scalar std) {
+    for (int k = at; k < at + size; ++k) p(k, k) += std * std * dt;
+  };
+  walk(B::kGyroBias, 3, noise.gyro_bias);
+  walk(B::kAccelBias, 3, noise.accel_bias);
+  for (int k = 0; k < B::Extra; ++k) walk(B::kExtra + k, 1, extra_walk[k]);
+  walk(B::kAnchors, 3 * anchors, noise.anchor);
+  mirror(p, rows);
 }
 
 }  // namespace tensegrity::inekf

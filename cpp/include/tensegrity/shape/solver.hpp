@@ -16,11 +16,13 @@
 #include <limits>
 #include <type_traits>
 
+#include "tensegrity/math/ldlt.hpp"
 #include "tensegrity/robot/prism.hpp"
 #include "tensegrity/shape/cables.hpp"
 #include "tensegrity/shape/constraints.hpp"
 #include "tensegrity/shape/fold.hpp"
 #include "tensegrity/shape/gauge.hpp"
+#include "tensegrity/shape/length_residuals.hpp"
 #include "tensegrity/shape/rods.hpp"
 #include "tensegrity/shape/starts.hpp"
 #include "tensegrity/types.hpp"
@@ -67,8 +69,8 @@ class Solver {
   Status solve(const CableLengths<Scalar>& lengths) {
     const Status input = check_lengths(lengths, prism_.rod_length);
     if (input != Status::kOk) return input;
-    Solution best{rods_, std::numeric_limits<Scalar>::max(), 0, false};
-    if (warm_) best = minimise(rods_, lengths);
+    Solution best{rods_, std::numeric_limits<Scalar>::max(), 0, false, false};
+    if (warm_) best = minimise(rods_, lengths, newton_);
     int iterations = best.iterations;
     if (!warm_ || handedness(best.rods.endcaps(), prism_.moment_sign()) != Handedness::kRight) {
       best = solve_cold(lengths, iterations);
@@ -79,6 +81,7 @@ class Solver {
     endcaps_ = rods_.endcaps();
     cost_ = best.cost;
     iterations_ = iterations;
+    newton_ = best.newton;
     warm_ = true;
     return best.converged ? Status::kOk : Status::kNotConverged;
   }
@@ -89,6 +92,7 @@ class Solver {
     endcaps_ = reference_;
     cost_ = 0;
     iterations_ = 0;
+    newton_ = false;
     warm_ = false;
   }
 
@@ -152,6 +156,7 @@ class Solver {
     Scalar cost;
     int iterations;
     bool converged;
+    bool newton;  // the last steps needed second derivatives
   };
 
   static Status check_std(Scalar value) {
@@ -171,46 +176,27 @@ class Solver {
     return 9 * residual * residual;
   }
 
-  // One descent from `start` to a local minimum.
-  Solution minimise(const Rods<Scalar>& start, const CableLengths<Scalar>& lengths) const {
+  // One descent from `start` to a local minimum. `newton`: take second derivatives from the start.
+  Solution minimise(const Rods<Scalar>& start, const CableLengths<Scalar>& lengths,
+                    bool newton = false) const {
     const Scalar initial_damping = Scalar(1e-3);
     // Beyond this no second-order model of the lengths holds.
     const Scalar max_step = Scalar(0.3) * prism_.rod_length;
-    Solution now{start, 0, 0, false};
-    Vector<Scalar, 9> residual = cable_lengths(now.rods.endcaps()) - lengths;
-    now.cost = residual.squaredNorm();
+    LengthResiduals<Scalar> residuals(start, lengths);
+    Solution now{start, residuals.cost(), 0, false, newton};
     Scalar damping = 0;
-    TangentMatrix<Scalar> first_order;
-    TangentMatrix<Scalar> second_order;
-    Tangent<Scalar> gradient;
-    bool moved = true;
-    bool newton = false;  // Gauss-Newton until that makes little progress
-    bool has_second_order = false;
     while (now.iterations < options_.max_iterations) {
       ++now.iterations;
-      if (moved) {
-        const LengthJacobian<Scalar> jacobian = length_jacobian(now.rods);
-        const Tangent<Scalar> t = spin_tangent(now.rods);
-        gradient.noalias() = jacobian.transpose() * residual;
-        // Coefficient by coefficient: faster than a blocked product at this size.
-        first_order = jacobian.transpose().lazyProduct(jacobian);
-        first_order.noalias() += t * t.transpose();
-        moved = false;
-        has_second_order = false;
-      }
-      if (newton && !has_second_order) {
-        second_order = weighted_length_hessian(now.rods, residual);
-        has_second_order = true;
-      }
-      TangentMatrix<Scalar> hessian = first_order;
-      if (newton) hessian += second_order;
-      hessian.diagonal().array() += damping;
-      Eigen::LLT<TangentMatrix<Scalar>> factor(hessian);
-      if (factor.info() != Eigen::Success) {  // not a minimum of the second-order model
-        damping = std::max(damping, initial_damping);
-        hessian = first_order;
+      const Tangent<Scalar> gradient = residuals.gradient(now.rods);
+      Ldlt<Scalar, kTangent> factor;
+      const auto model = [&](bool second_order) {
+        TangentMatrix<Scalar> hessian = residuals.hessian(now.rods, second_order);
         hessian.diagonal().array() += damping;
-        factor.compute(hessian);
+        return factor.factor(hessian);
+      };
+      if (!model(now.newton)) {  // not a minimum of the second-order model
+        damping = std::max(damping, initial_damping);
+        model(false);
       }
       Tangent<Scalar> step = -factor.solve(gradient);
       const Scalar length = step.norm();
@@ -221,15 +207,15 @@ class Solver {
       if (length > max_step) step *= max_step / length;
       Rods<Scalar> trial = now.rods;
       trial.retract(step);
-      const Vector<Scalar, 9> trial_residual = cable_lengths(trial.endcaps()) - lengths;
-      const Scalar trial_cost = trial_residual.squaredNorm();
-      newton = trial_cost > Scalar(0.1) * now.cost;
+      const LengthResiduals<Scalar> trial_residuals(trial, lengths);
+      const Scalar trial_cost = trial_residuals.cost();
+      // Gauss-Newton as long as that makes much progress.
+      now.newton = trial_cost > Scalar(0.1) * now.cost;
       if (trial_cost < now.cost) {
         now.rods = trial;
         now.cost = trial_cost;
-        residual = trial_residual;
+        residuals = trial_residuals;
         damping = damping > initial_damping / 100 ? damping / 10 : Scalar(0);
-        moved = true;
       } else {
         damping = std::max(10 * damping, initial_damping);
       }
@@ -249,7 +235,7 @@ class Solver {
     // Lengths that have no solution are fitted best on the fold itself, on neither side of it.
     const Scalar on_fold = Scalar(-0.01);
     const Scalar sign = prism_.moment_sign();
-    Solution best{rods_, std::numeric_limits<Scalar>::max(), 0, false};
+    Solution best{rods_, std::numeric_limits<Scalar>::max(), 0, false, false};
     bool best_is_positive = false;
     for (int k = 0; k < kColdStarts; ++k) {
       Solution candidate = minimise(cold_start(prism_, k), lengths);
@@ -303,6 +289,7 @@ class Solver {
   Endcaps<Scalar> endcaps_;
   Scalar cost_ = 0;
   int iterations_ = 0;
+  bool newton_ = false;  // the last solution is near the fold: so will the next one be
   bool warm_ = false;
 };
 

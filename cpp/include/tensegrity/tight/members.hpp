@@ -23,11 +23,10 @@ struct CableResult {
 inline constexpr int kMostOutliers = 2;
 
 template <typename Scalar>
-CableResult<Scalar> correct_cables(Belief<Scalar>& belief, const CableLengths<Scalar>& lengths,
-                                   Scalar std, Scalar gate) {
+CableResult<Scalar> correct_cables(SequentialUpdate<Scalar>& update, const Belief<Scalar>& belief,
+                                   const CableLengths<Scalar>& lengths, Scalar std, Scalar gate) {
   using B = Belief<Scalar>;
   CableResult<Scalar> result;
-  SequentialUpdate<Scalar> update(belief);
   std::array<int, 9> outliers;
   int count = 0;
   const auto correct = [&](int k, Scalar limit) {
@@ -63,9 +62,9 @@ CableResult<Scalar> correct_cables(Belief<Scalar>& belief, const CableLengths<Sc
 // n . (w_a - w_b) = 0. The standard deviations [m], [m/s] stand for what linearisation leaves out:
 // an error of direction of x metres at each end shortens the rod by 2 x^2 / L in second order.
 template <typename Scalar>
-void hold_rods(Belief<Scalar>& belief, Scalar rod_length, Scalar length_std, Scalar stretch_std) {
+void hold_rods(SequentialUpdate<Scalar>& update, const Belief<Scalar>& belief, Scalar rod_length,
+               Scalar length_std, Scalar stretch_std) {
   using B = Belief<Scalar>;
-  SequentialUpdate<Scalar> update(belief);
   for (int a = 2; a < 6; a += 2) {
     const int b = a + 1;
     const Vector3<Scalar> span = belief.endcap(a) - belief.endcap(b);

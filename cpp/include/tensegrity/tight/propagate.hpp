@@ -1,11 +1,12 @@
-// One IMU sample: the base rod by strapdown integration (as in inekf/propagate.hpp, exact for a
-// constant rate and specific force in the body), the other rods by inertia.
+// One IMU sample: the base rod by strapdown integration, the other rods by inertia.
 //
-// Endcaps 2 .. 5 move with constant velocity, driven by white acceleration. F is never formed: it
-// acts on the columns of P, the result is transposed, and F acts once more.
+// Endcaps 2 .. 5 move with constant velocity, driven by white acceleration. The transition
+// F = I + A is never formed: it acts on the columns of P, P F', and then on the rows of the lower
+// triangle of that.
 #pragma once
 
-#include "tensegrity/inekf/propagate.hpp"
+#include "tensegrity/inekf/strapdown.hpp"
+#include "tensegrity/math/symmetric.hpp"
 #include "tensegrity/tight/belief.hpp"
 
 namespace tensegrity::tight {
@@ -28,104 +29,91 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   using B = Belief<Scalar>;
   using V3 = Vector3<Scalar>;
   using M3 = Matrix3<Scalar>;
-  const V3 w = imu.gyro - belief.gyro_bias;
-  const V3 a = imu.accel - belief.accel_bias;
-  const V3 g(0, 0, -gravity);
-  const Gamma<Scalar> gamma(w * dt);
-  const Scalar dt2 = dt * dt;
-
-  // ---- mean
-  const M3 start = belief.rotation;
-  const M3 mean_rotation = start * gamma.g1;
+  const inekf::ImuSample<Scalar> motion{imu.gyro - belief.gyro_bias, imu.accel - belief.accel_bias};
   auto& x = belief.columns;
-  x.col(1) += x.col(0) * dt + start * (gamma.g2 * a) * dt2 + g * (dt2 / 2);
-  x.col(0) += mean_rotation * a * dt + g * dt;
+  const inekf::Strapdown<Scalar> body =
+      inekf::integrate(belief.rotation, x.col(0), x.col(1), motion, dt, gravity);
   x.template middleCols<4>(2) += dt * x.template middleCols<4>(6);
-  belief.rotation = orthonormalized<Scalar>(start * gamma.g0);
-  belief.rate = w;
+  belief.rate = motion.gyro;
 
-  // ---- transition. Every column c of the group sees an error of the gyro's bias through the
-  // rotation: xi_c+ = ... - hat(c) int R zeta_g; v and p have their own integrals besides
-  // (inekf/propagate.hpp derives them).
-  const M3 int_r = mean_rotation * dt;
-  const M3 gx = hat(g) * dt;
-  std::array<M3, B::kColumns> gyro_to;
-  for (int c = 0; c < B::kColumns; ++c) gyro_to[std::size_t(c)] = -hat(x.col(c)) * int_r;
-  gyro_to[0] -= dt2 * start * gamma.g1_derivative(a);
-  gyro_to[1] -= dt2 * dt * start * gamma.g2_derivative(a);
-  const M3 accel_to_position = -dt2 * (start * gamma.g2);
-
-  auto& p = belief.covariance;
-  // Rows `to` of F P get m times rows `from`; where a row is both, it is a target last.
-  struct Term {
-    int to, from;
-    M3 m;
-  };
-  std::array<Term, 15> terms;
-  std::size_t count = 0;
-  const auto add = [&](int to, int from, const M3& m) { terms[count++] = {to, from, m}; };
-  add(B::kPosition, B::kRotation, gx * (dt / 2));
-  add(B::kPosition, B::kGyroBias, gyro_to[1]);
-  add(B::kPosition, B::kAccelBias, accel_to_position);
-  add(B::kVelocity, B::kRotation, gx);
-  add(B::kVelocity, B::kGyroBias, gyro_to[0]);
-  add(B::kVelocity, B::kAccelBias, -int_r);
+  // A, columns of the gyro's bias: every column of the group sees it through the rotation.
+  Matrix<Scalar, B::Dim, 3> by_gyro = Matrix<Scalar, B::Dim, 3>::Zero();
+  by_gyro.template middleRows<3>(B::kRotation) = -body.int_r;
+  by_gyro.template middleRows<3>(B::kVelocity) = body.velocity_by_gyro;
+  by_gyro.template middleRows<3>(B::kPosition) = body.position_by_gyro;
   for (int c = 2; c < B::kColumns; ++c) {
-    add(B::column_index(c), B::kGyroBias, gyro_to[std::size_t(c)]);
-  }
-  add(B::kRotation, B::kGyroBias, -int_r);
-  for (int side = 0; side < 2; ++side) {
-    p.template middleCols<3>(B::kPosition) += dt * p.template middleCols<3>(B::kVelocity);
-    p.template middleCols<12>(B::kEndcaps) += dt * p.template middleCols<12>(B::kRates);
-    for (const Term& term : terms) {
-      Scalar* target = p.col(term.to).data();
-      const Scalar* source = p.col(term.from).data();
-      const M3& m = term.m;
-      for (int i = 0; i < B::Dim; ++i) {  // three columns from three: what is loaded is used thrice
-        const Scalar a0 = source[i], a1 = source[i + B::Dim], a2 = source[i + 2 * B::Dim];
-        target[i] += m(0, 0) * a0 + m(0, 1) * a1 + m(0, 2) * a2;
-        target[i + B::Dim] += m(1, 0) * a0 + m(1, 1) * a1 + m(1, 2) * a2;
-        target[i + 2 * B::Dim] += m(2, 0) * a0 + m(2, 1) * a1 + m(2, 2) * a2;
-      }
-    }
-    p.transposeInPlace();
+    by_gyro.template middleRows<3>(B::column_index(c)) = body.column_by_gyro(x.col(c));
   }
 
-  // ---- noise. That of the gyro enters every column like its bias, L = (I, hat(c) ...).
-  const Scalar gyro = noise.gyro * dt;
-  Matrix<Scalar, B::Dim, 3> l = Matrix<Scalar, B::Dim, 3>::Zero();
-  l.template middleRows<3>(B::kRotation) = gyro * M3::Identity();
+  // ---- P F': every row of it
+  auto& p = belief.covariance;
+  const M3& v_rotation = body.velocity_by_rotation;
+  const M3 p_rotation = v_rotation * (dt / 2);
+  const auto add = [&](int to, int from, const M3& m) { add_columns(p, to, from, m, B::Dim); };
+  p.template middleCols<3>(B::kPosition) += dt * p.template middleCols<3>(B::kVelocity);
+  p.template middleCols<12>(B::kEndcaps) += dt * p.template middleCols<12>(B::kRates);
+  add(B::kPosition, B::kRotation, p_rotation);
+  add(B::kPosition, B::kAccelBias, body.position_by_accel);
+  add(B::kVelocity, B::kRotation, v_rotation);
+  add(B::kVelocity, B::kAccelBias, -body.int_r);
+  add(B::kRotation, B::kGyroBias, -body.int_r);
   for (int c = 0; c < B::kColumns; ++c) {
-    l.template middleRows<3>(B::column_index(c)) = gyro * hat(x.col(c));
+    const int at = B::column_index(c);
+    add(at, B::kGyroBias, by_gyro.template middleRows<3>(at));
   }
-  for (int j = 0; j < B::kOffsets; ++j) {
-    p.col(j) += l(j, 0) * l.col(0) + l(j, 1) * l.col(1) + l(j, 2) * l.col(2);
-  }
-  // Rounding made the triangles differ.
-  p.template triangularView<Eigen::StrictlyUpper>() = p.transpose();
 
-  const auto walk = [&](int at, int size, Scalar std) {
-    p.diagonal().segment(at, size).array() += std * std * dt;
-  };
-  // White acceleration, integrated once and twice.
-  const auto accelerate = [&](int velocity, int position, int size, Scalar density) {
-    for (int k = 0; k < size; ++k) {
-      p(velocity + k, velocity + k) += density * dt;
-      p(position + k, position + k) += density * dt * dt2 / 3;
-      p(velocity + k, position + k) += density * dt2 / 2;
-      p(position + k, velocity + k) += density * dt2 / 2;
+  // ---- F (P F'): rows from the diagonal on. The noise of a sample is one more error of its
+  // biases, which reaches column j of P F' as row j of A.
+  const Scalar gyro_variance = noise.gyro * noise.gyro;
+  const Scalar accel_variance = noise.accel * noise.accel;
+  for (int j = 0; j < B::kOffsets; ++j) {
+    auto column = p.col(j);
+    const V3 r = column.template segment<3>(B::kRotation);
+    const V3 v = column.template segment<3>(B::kVelocity);
+    const V3 gyro =
+        column.template segment<3>(B::kGyroBias) + gyro_variance * by_gyro.row(j).transpose();
+    V3 accel = column.template segment<3>(B::kAccelBias);
+    if (j >= B::kVelocity && j < B::kPosition) {
+      accel -= accel_variance * body.int_r.row(j - B::kVelocity).transpose();
+    } else if (j >= B::kPosition && j < B::kGyroBias) {
+      accel += accel_variance * body.position_by_accel.row(j - B::kPosition).transpose();
     }
+    if (j < B::kGyroBias) {
+      column.template segment<3>(B::kVelocity) += v_rotation * r - body.int_r * accel;
+      column.template segment<3>(B::kPosition) +=
+          dt * v + p_rotation * r + body.position_by_accel * accel;
+    }
+    if (j < B::kRates) {
+      column.template segment<12>(B::kEndcaps) += dt * column.template segment<12>(B::kRates);
+    }
+    const Scalar g0 = gyro[0], g1 = gyro[1], g2 = gyro[2];
+    const Scalar *a0 = &by_gyro(0, 0), *a1 = &by_gyro(0, 1), *a2 = &by_gyro(0, 2);
+    Scalar* y = &p(0, j);
+    for (int i = packet_start(j); i < padded(B::kOffsets); ++i) {
+      y[i] += a0[i] * g0 + a1[i] * g1 + a2[i] * g2;
+    }
+  }
+
+  // ---- walks of the step
+  const auto walk = [&](int at, int size, Scalar std) {
+    for (int k = at; k < at + size; ++k) p(k, k) += std * std * dt;
   };
-  accelerate(B::kVelocity, B::kPosition, 3, noise.accel * noise.accel * dt);
-  accelerate(B::kRates, B::kEndcaps, 12, noise.endcap_acceleration * noise.endcap_acceleration);
   walk(B::kGyroBias, 3, noise.gyro_bias);
   walk(B::kAccelBias, 3, noise.accel_bias);
   walk(B::kGround, 1, noise.ground_height);
+  // White acceleration of endcaps, integrated once and twice.
+  const Scalar density = noise.endcap_acceleration * noise.endcap_acceleration;
+  for (int k = 0; k < 12; ++k) {
+    p(B::kRates + k, B::kRates + k) += density * dt;
+    p(B::kRates + k, B::kEndcaps + k) += density * dt * dt / 2;
+    p(B::kEndcaps + k, B::kEndcaps + k) += density * dt * dt * dt / 3;
+  }
   // The slope changes about where the robot is: z = m_0 + m_1 x + m_2 y stays there.
   Matrix<Scalar, 3, 2> tilt;
   tilt << -x(0, 1), -x(1, 1), 1, 0, 0, 1;
   p.template block<3, 3>(B::kGround, B::kGround) +=
       (noise.ground_slope * noise.ground_slope * dt) * tilt.lazyProduct(tilt.transpose());
+  mirror(p, B::Dim);
 }
 
 }  // namespace tensegrity::tight

@@ -11,6 +11,7 @@
 #include <array>
 #include <cmath>
 
+#include "tensegrity/math/symmetric.hpp"
 #include "tensegrity/tight/belief.hpp"
 
 namespace tensegrity::tight {
@@ -112,31 +113,11 @@ class SequentialUpdate {
   }
 
  private:
-  static constexpr int kCapacity = 12;  // of three feet, and of nine cables
+  static constexpr int kCapacity = 16;  // nine cables with two rods are 13, three feet 12
 
-  // Two columns of P against four of the gains at a time: what is loaded is used twice.
   void downdate() {
     for (int k = 0; k < waiting_; ++k) gains_.col(k) *= applied_[std::size_t(k)];
-    int k = 0;
-    for (; k + 4 <= waiting_; k += 4) {
-      const Scalar* g = gains_.col(k).data();
-      for (int j = 0; j < B::Dim; j += 2) {
-        const auto a = gains_.template block<1, 4>(j, k).eval();
-        const auto b = gains_.template block<1, 4>(j + 1, k).eval();
-        Scalar* p = belief_.covariance.col(j).data();
-        for (int i = 0; i < B::Dim; ++i) {
-          const Scalar g0 = g[i], g1 = g[i + B::Dim], g2 = g[i + 2 * B::Dim],
-                       g3 = g[i + 3 * B::Dim];
-          p[i] -= a[0] * g0 + a[1] * g1 + a[2] * g2 + a[3] * g3;
-          p[i + B::Dim] -= b[0] * g0 + b[1] * g1 + b[2] * g2 + b[3] * g3;
-        }
-      }
-    }
-    for (; k < waiting_; ++k) {
-      for (int j = 0; j < B::Dim; ++j) {
-        belief_.covariance.col(j) -= gains_(j, k) * gains_.col(k);
-      }
-    }
+    subtract_outer(belief_.covariance, gains_, waiting_, B::Dim);
     waiting_ = 0;
   }
 

@@ -1,0 +1,34 @@
+// Least squares written for the net against the same through the Jacobian of all lengths.
+#include <doctest/doctest.h>
+
+#include "shape_samples.hpp"
+#include "tensegrity/shape/length_residuals.hpp"
+
+namespace tensegrity::shape {
+namespace {
+
+TEST_CASE("cost, gradient and Hessian of the residuals") {
+  const Prism<double> prism;
+  test::Samples samples(40);
+  for (int n = 0; n < 100; ++n) {
+    const Rods<double> rods = samples.shape(prism);
+    const CableLengths<double> lengths = cable_lengths(rods.endcaps());
+    const CableLengths<double> measured = lengths + samples.normal<9>(0.1);
+    const LengthResiduals<double> residuals(rods, measured);
+    const CableLengths<double> r = lengths - measured;
+    const LengthJacobian<double> jacobian = length_jacobian(rods);
+    const Tangent<double> spin = spin_tangent(rods);
+    CHECK(residuals.cost() == doctest::Approx(r.squaredNorm()).epsilon(1e-12));
+    CHECK((residuals.gradient(rods) - jacobian.transpose() * r).norm() < 1e-12);
+
+    TangentMatrix<double> dense = jacobian.transpose() * jacobian + spin * spin.transpose();
+    for (const bool second_order : {false, true}) {
+      if (second_order) dense += weighted_length_hessian(rods, r);
+      const TangentMatrix<double> off = residuals.hessian(rods, second_order) - dense;
+      CHECK(TangentMatrix<double>(off.triangularView<Eigen::Lower>()).norm() < 1e-12);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tensegrity::shape
