@@ -99,7 +99,7 @@ class Priors(StrictModel):
     accelerometer_bias_std: float = field("accelerometer bias", unit="m/s^2", ge=0)
     spin_std: float = field("spin", unit="rad", ge=0)
     cable_offset_std: float = field("constant error of a cable length", unit="m", ge=0)
-    ground_slope_std: float = field("slope of the ground, unless terrain: flat", unit="rad", ge=0)
+    ground_slope_std: float = field("slope of the ground at the start", unit="rad", ge=0)
 
 
 class Noises(StrictModel):

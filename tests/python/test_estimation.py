@@ -232,10 +232,11 @@ def test_flat_ground_is_not_taken_for_a_slope(base_imu_only):
     assert estimate(base_imu_only).health["terrain_mismatches"][-1] == 0
 
 
-def test_a_slope_that_was_declared_flat_is_noticed(uphill):
+def test_a_slope_that_was_declared_flat_is_noticed_and_does_no_harm(uphill):
     trajectory = estimate(uphill)
     assert_finite(trajectory)
     assert trajectory.health["terrain_mismatches"][-1] == 1
+    assert evaluate(trajectory, uphill).final_drift_percent < LARGEST_DRIFT_PERCENT
 
 
 @pytest.mark.parametrize("terrain", ["slope", "unknown"])

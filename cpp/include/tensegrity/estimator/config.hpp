@@ -72,7 +72,7 @@ struct PrismConfig {
   Scalar accelerometer_bias_std = Scalar(0.05);                  // [m/s^2]
   Scalar spin_prior_std = Scalar(0.1);                           // [rad]
   Scalar cable_offset_std = Scalar(0.005);                       // constant error of a cable [m]
-  Scalar ground_slope_std = Scalar(0.1);                         // unless terrain is flat
+  Scalar ground_slope_std = Scalar(0.1);                         // at the start
 
   // noises: standard deviations
   Scalar gyroscope_std = Scalar(0.002);            // of one sample [rad/s]

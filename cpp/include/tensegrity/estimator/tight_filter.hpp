@@ -23,6 +23,7 @@
 #include "tensegrity/estimator/spin_start.hpp"
 #include "tensegrity/estimator/static_start.hpp"
 #include "tensegrity/shape/solver.hpp"
+#include "tensegrity/tight/flat_ground.hpp"
 #include "tensegrity/tight/friction.hpp"
 #include "tensegrity/tight/members.hpp"
 #include "tensegrity/tight/place.hpp"
@@ -115,11 +116,15 @@ class TightFilter {
   // The feet, once all measurements of the step are in.
   void end_step(Scalar dt, PrismHealth& health) {
     correct_rods();
-    const Endcaps<Scalar> world = belief_.endcaps_world();
+    // Heights above the plane decide which endcaps are feet, the vertical how they share the
+    // weight: the plane is sheared level, which moves nothing sideways.
+    Endcaps<Scalar> world = belief_.endcaps_world();
+    world.row(2) -= belief_.ground.template tail<2>().transpose() * world.template topRows<2>();
     loaded_ = detector_.update(world, dt);
     if (flags_are_new_) loaded_ = detector_.measure(flags_, flag_odds_);
     flags_are_new_ = false;
     correct_feet(world, dt);
+    if (config_.terrain == Terrain::kFlat) hold_flat(health);
     watch(dt, health);
     for (RodImu& imu : rod_imus_) imu.fresh = false;
   }
@@ -154,10 +159,10 @@ class TightFilter {
     p.diagonal()
         .template segment<9>(Belief::kOffsets)
         .setConstant(square(config_.cable_offset_std));
-    const bool flat = config_.terrain == Terrain::kFlat;
     p.diagonal()
         .template segment<2>(Belief::kGround + 1)
-        .setConstant(square(flat ? kFlatSlopeStd : config_.ground_slope_std));
+        .setConstant(square(config_.ground_slope_std));
+    flatness_ = tight::Flatness::kUndecided;
 
     const SpinStart<Scalar> spin = stand(solver_.endcaps());
     const Endcaps<Scalar> h = spun(solver_.endcaps(), spin.angle);
@@ -289,14 +294,28 @@ class TightFilter {
     if (feet > 0) ground_nis_ = chi_square / feet;
   }
 
+  // The declaration that the ground is flat: tested once the slope is known, and watched from then
+  // on. Slopes too small for the test bend little, and show in the estimate later: from then on the
+  // ground is a plane of unknown slope.
+  void hold_flat(PrismHealth& health) {
+    const tight::Flatness before = flatness_;
+    if (flatness_ == tight::Flatness::kUndecided) {
+      flatness_ = tight::judge_flatness(belief_);
+    } else if (flatness_ == tight::Flatness::kBelieved && complete_ >= kCompleteSamples &&
+               belief_.ground.template tail<2>().norm() > kSlopeNoticed) {
+      flatness_ = tight::Flatness::kRefuted;
+      belief_.covariance.diagonal().template segment<2>(Belief::kGround + 1).array() +=
+          square(config_.ground_slope_std);
+    }
+    if (flatness_ != before && flatness_ == tight::Flatness::kRefuted) ++health.terrain_mismatches;
+  }
+
   // ---- losing lock: what cannot be true of a robot on its feet, for too long
   //
   //  - a loaded foot away from the ground: the shape is another one (the wrong side of the fold, a
   //    wrong spin). The spin about the base rod, which no cable holds, is widened. Placing the
   //    endcaps anew instead made matters worse in trials: in a fall the nearest solution of nine
   //    lengths is as often the wrong one.
-  //  - ground that was declared flat, but tilts by five times what floors are allowed to. From then
-  //    on it is a plane of unknown slope.
   //  - every foot slides fast although nothing shakes the robot: the velocity is wrong (a fall can
   //    leave it so, and sure of itself). It is widened.
   void watch(Scalar dt, PrismHealth& health) {
@@ -311,13 +330,6 @@ class TightFilter {
       tight::widen_spin(belief_, kLostSpin);
       ++health.spin_resets;
     }
-    if (config_.terrain == Terrain::kFlat && !terrain_opened_ &&
-        belief_.ground.template tail<2>().norm() > kSlopeNoticed) {
-      terrain_opened_ = true;
-      belief_.covariance.diagonal().template segment<2>(Belief::kGround + 1).array() +=
-          square(config_.ground_slope_std);
-      ++health.terrain_mismatches;
-    }
     const bool sliding = slowest_foot_ < std::numeric_limits<Scalar>::max() &&
                          slowest_foot_ > kImpossibleSlip && activity_.level() < Scalar(0.5);
     sliding_ = sliding ? sliding_ + dt : Scalar(0);
@@ -330,9 +342,9 @@ class TightFilter {
 
   // phi from the endcaps that are on the ground. The ground may slope.
   SpinStart<Scalar> stand(const Endcaps<Scalar>& q) const {
-    const Scalar slope = config_.terrain == Terrain::kFlat ? Scalar(0) : config_.ground_slope_std;
-    SpinStart<Scalar> spin = find_spin(q, V3(belief_.rotation.transpose() * V3::UnitZ()), flags_,
-                                       std::hypot(kStartShapeStd, slope * robot_.rod_length / 2));
+    SpinStart<Scalar> spin =
+        find_spin(q, V3(belief_.rotation.transpose() * V3::UnitZ()), flags_,
+                  std::hypot(kStartShapeStd, config_.ground_slope_std * robot_.rod_length / 2));
     if (!spin.found) spin.variance = square(config_.spin_prior_std);
     return spin;
   }
@@ -352,9 +364,8 @@ class TightFilter {
   // inclination from its accelerometer is this uncertain [1].
   static constexpr Scalar kLeastTurn = Scalar(0.2);
   static constexpr Scalar kInclinationMoving = Scalar(0.3);
-  // Level floors: 10 mm over 4 m is the tolerance of DIN 18202.
-  static constexpr Scalar kFlatSlopeStd = Scalar(0.0025);
-  static constexpr Scalar kSlopeNoticed = Scalar(5) * kFlatSlopeStd;
+  // Ground that was believed to be flat is not when its slope is estimated beyond this.
+  static constexpr Scalar kSlopeNoticed = Scalar(5 * tight::kFlatSlopeStd);
   // What is added to a lost spin [rad], and how long that is left to settle [s].
   static constexpr Scalar kLostSpin = Scalar(0.3);
   static constexpr Scalar kSpinRest = Scalar(5);
@@ -385,7 +396,7 @@ class TightFilter {
   Scalar off_ground_ = 0, sliding_ = 0;         // for how long [s]
   Scalar since_spin_reset_ = kSpinRest;         // [s]
   int complete_ = 0;                            // samples of all nine cables in a row
-  bool terrain_opened_ = false;
+  tight::Flatness flatness_ = tight::Flatness::kUndecided;
   Scalar cable_nis_ = std::numeric_limits<Scalar>::quiet_NaN();
   Scalar ground_nis_ = std::numeric_limits<Scalar>::quiet_NaN();
 };
