@@ -10,12 +10,14 @@
 // With the defaults of `PrismConfig` it is T as published; its settings switch single improvements.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "tensegrity/contact/detector.hpp"
 #include "tensegrity/estimator/activity.hpp"
 #include "tensegrity/estimator/config.hpp"
+#include "tensegrity/estimator/pending.hpp"
 #include "tensegrity/estimator/prism_state.hpp"
 #include "tensegrity/estimator/spin_start.hpp"
 #include "tensegrity/estimator/static_start.hpp"
@@ -55,7 +57,7 @@ class LooseFilter {
       ++health.shape_failures;
       return false;
     }
-    start_attitude(rest.gyro, rest.accel, rest.samples);
+    start_attitude(rest);
     start_spin();
     started_ = true;
     update_contacts();
@@ -80,12 +82,16 @@ class LooseFilter {
 
   void end_step(Scalar, PrismHealth&) {}
 
-  // Nine lengths [m], all of them measured, `dt` [s] after the last ones.
-  Status correct_cables(const CableLengths<Scalar>& lengths, Scalar dt, PrismHealth& health) {
+  // Nine lengths [m] of the instant `t`, all of them measured.
+  Status correct_cables(Nanoseconds t, const CableLengths<Scalar>& lengths, PrismHealth& health) {
     if (!lengths.allFinite()) {
       ++health.cables_dropped;
       return Status::kNotFinite;
     }
+    const Scalar dt =
+        shape_seen_ ? std::max(Scalar(double(t - shape_time_) * 1e-9), Scalar(0)) : Scalar(0);
+    shape_time_ = t;
+    shape_seen_ = true;
     const Endcaps<Scalar> before = endcaps_;
     const Status shape = update_shape(lengths, dt);
     if (shape != Status::kOk) {
@@ -169,28 +175,12 @@ class LooseFilter {
     return true;
   }
 
-  // Roll and pitch from the mean specific force, gyro bias from the mean rate. The force fixes the
-  // tilt only as well as the accelerometer bias is known: the update below keeps their correlation.
-  void start_attitude(const V3& mean_gyro, const V3& mean_accel, int samples) {
+  // The force fixes the tilt only as well as the accelerometer's bias is known: the update keeps
+  // their correlation.
+  void start_attitude(const AtRest<Scalar>& rest) {
     belief_ = Belief{};
-    const V3 force = mean_accel - config_.accelerometer_bias;
-    belief_.rotation = shortest_rotation<Scalar>(force.normalized(), V3::UnitZ());
-    belief_.gyro_bias = mean_gyro;
-    belief_.accel_bias = config_.accelerometer_bias;
-
+    const V3 force = stand_still(belief_, rest, config_);
     auto& p = belief_.covariance;
-    const auto set = [&](int at, Scalar std) {
-      p.diagonal().template segment<3>(at).setConstant(std * std);
-    };
-    set(Belief::kRotation, config_.orientation_std);
-    p(Belief::kRotation + 2, Belief::kRotation + 2) = 0;  // heading: zero by definition
-    set(Belief::kVelocity, config_.velocity_std);
-    set(Belief::kPosition, config_.position_std);
-    set(Belief::kGyroBias, config_.static_bias_initialization
-                               ? config_.gyroscope_std / std::sqrt(Scalar(samples))
-                               : config_.gyroscope_bias_std);
-    set(Belief::kAccelBias, config_.accelerometer_bias_std);
-
     // R (mean - b_a) + g = g x xi_R - R zeta_a + R n at rest.
     const V3 g(0, 0, -config_.gravity);
     const Matrix3<Scalar> gx = hat(g);
@@ -201,7 +191,7 @@ class LooseFilter {
     z.covariance = gx * z.cross.template middleRows<3>(Belief::kRotation) -
                    belief_.rotation * z.cross.template middleRows<3>(Belief::kAccelBias);
     z.covariance.diagonal().array() +=
-        config_.accelerometer_std * config_.accelerometer_std / Scalar(samples);
+        config_.accelerometer_std * config_.accelerometer_std / Scalar(rest.samples);
     inekf::correct(belief_, z, Scalar(0));
   }
 
@@ -342,7 +332,8 @@ class LooseFilter {
   std::array<Scalar, MaxContacts + 1> gates_{};        // by number of contacts; 0: no gate
   Flags flags_{};
   Activity<Scalar> activity_{kActiveForce, kActiveRate};
-  bool contacts_seen_ = false, started_ = false;
+  Nanoseconds shape_time_ = 0;  // of the last lengths
+  bool shape_seen_ = false, contacts_seen_ = false, started_ = false;
 };
 
 }  // namespace tensegrity

@@ -68,19 +68,11 @@ class PrismEstimator {
 
   // Nine distances of endcap centres [m], in the order of kPrismCables; NaN: not measured.
   Status cables(Nanoseconds t, const CableLengths<Scalar>& lengths) {
-    Status status = check_lengths(lengths);
-    if (status == Status::kOk) status = check_stamp(t, last_cables_, cables_seen_);
-    if (status != Status::kOk) {
-      ++health_.cables_dropped;
-      return status;
-    }
-    last_cables_ = t;
-    cables_seen_ = true;
-    typename PendingQueue<Scalar>::Item item;
-    item.t = t;
-    item.kind = PendingMeasurement<Scalar>::Kind::kCables;
-    item.lengths = lengths;
-    return take(item);
+    Measurement measurement;
+    measurement.t = t;
+    measurement.kind = Measurement::Kind::kCables;
+    measurement.lengths = lengths;
+    return take_new(measurement, check_lengths(lengths), cable_stamps_, health_.cables_dropped);
   }
 
   // An IMU on rod 1 (r23) or 2 (r45): rate [rad/s] and specific force [m/s^2] in its own frame, z
@@ -106,18 +98,11 @@ class PrismEstimator {
 
   // Which endcaps are on the ground. Without any call, the built-in detector decides.
   Status contacts(Nanoseconds t, const Flags& flags) {
-    const Status status = check_stamp(t, last_contacts_, contacts_seen_);
-    if (status != Status::kOk) {
-      ++health_.contacts_dropped;
-      return status;
-    }
-    last_contacts_ = t;
-    contacts_seen_ = true;
-    typename PendingQueue<Scalar>::Item item;
-    item.t = t;
-    item.kind = PendingMeasurement<Scalar>::Kind::kContacts;
-    item.flags = flags;
-    return take(item);
+    Measurement measurement;
+    measurement.t = t;
+    measurement.kind = Measurement::Kind::kContacts;
+    measurement.flags = flags;
+    return take_new(measurement, Status::kOk, contact_stamps_, health_.contacts_dropped);
   }
 
   bool initialized() const { return initialized_; }
@@ -138,6 +123,14 @@ class PrismEstimator {
   const Prism<Scalar>& robot() const { return robot_; }
 
  private:
+  using Measurement = PendingMeasurement<Scalar>;
+
+  // Newest stamp of one kind of measurement.
+  struct Stamps {
+    Nanoseconds last = 0;
+    bool seen = false;
+  };
+
   static constexpr Scalar kPriorSigmas = Scalar(5);
   static constexpr Scalar kUniform = Scalar(0.2886751);   // 1/sqrt(12)
   static constexpr Scalar kLongestBridge = Scalar(1);     // [s]
@@ -176,18 +169,26 @@ class PrismEstimator {
     return Status::kOk;
   }
 
-  Status check_stamp(Nanoseconds t, Nanoseconds last, bool seen) const {
-    if (seen && t == last) return Status::kDuplicate;
-    if (seen && t < last) return Status::kOutOfOrder;
+  Status check_stamp(Nanoseconds t, const Stamps& stamps) const {
+    if (stamps.seen && t == stamps.last) return Status::kDuplicate;
+    if (stamps.seen && t < stamps.last) return Status::kOutOfOrder;
     if (imu_seen_ && t < time_ && seconds(t, time_) > config_.max_latency) return Status::kTooLate;
     return Status::kOk;
   }
 
   // ---- time
 
-  Status take(const typename PendingQueue<Scalar>::Item& item) {
-    if (imu_seen_ && item.t <= time_) return apply(item);
-    if (!pending_.push(item)) ++health_.cables_dropped;
+  // `content`: what is wrong with the measurement itself.
+  Status take_new(const Measurement& measurement, Status content, Stamps& stamps,
+                  std::uint32_t& dropped) {
+    const Status status = content == Status::kOk ? check_stamp(measurement.t, stamps) : content;
+    if (status != Status::kOk) {
+      ++dropped;
+      return status;
+    }
+    stamps = {measurement.t, true};
+    if (imu_seen_ && measurement.t <= time_) return apply(measurement);
+    if (!pending_.push(measurement)) ++health_.cables_dropped;
     return Status::kOk;
   }
 
@@ -201,15 +202,13 @@ class PrismEstimator {
     }
   }
 
-  Status apply(const typename PendingQueue<Scalar>::Item& item) {
-    if (item.kind == PendingMeasurement<Scalar>::Kind::kContacts) {
-      filter_.set_contacts(item.flags);
+  Status apply(const Measurement& measurement) {
+    if (measurement.kind == Measurement::Kind::kContacts) {
+      filter_.set_contacts(measurement.flags);
       return Status::kOk;
     }
-    const Scalar dt = cables_applied_ ? std::max(seconds(applied_, item.t), Scalar(0)) : Scalar(0);
-    applied_ = item.t;
-    cables_applied_ = true;
-    return initialized_ ? filter_.correct_cables(item.lengths, dt, health_) : collect(item.lengths);
+    if (!initialized_) return collect(measurement.lengths);
+    return filter_.correct_cables(measurement.t, measurement.lengths, health_);
   }
 
   Status advance(Nanoseconds begin, Nanoseconds t, const inekf::ImuSample<Scalar>& previous,
@@ -301,9 +300,9 @@ class PrismEstimator {
   std::array<int, 9> still_cables_{};  // how many lengths of each cable are in the mean
   inekf::ImuSample<Scalar> last_sample_{V3::Zero(), V3::Zero()};
   PrismHealth health_;
-  Nanoseconds time_ = 0, last_cables_ = 0, last_contacts_ = 0, applied_ = 0;
-  bool imu_seen_ = false, cables_seen_ = false, contacts_seen_ = false, cables_applied_ = false;
-  bool initialized_ = false;
+  Stamps cable_stamps_, contact_stamps_;
+  Nanoseconds time_ = 0;
+  bool imu_seen_ = false, initialized_ = false;
 };
 
 }  // namespace tensegrity

@@ -2,10 +2,11 @@
 // sensor noise and bias priors explain.
 #pragma once
 
-#include <array>
+#include <cmath>
 
+#include "tensegrity/estimator/config.hpp"
+#include "tensegrity/math/so3.hpp"
 #include "tensegrity/robot/prism.hpp"
-#include "tensegrity/types.hpp"
 
 namespace tensegrity {
 
@@ -17,6 +18,30 @@ struct AtRest {
   int samples = 1;               // that were averaged
   CableLengths<Scalar> lengths;  // mean lengths [m]
 };
+
+// The base rod of a belief at rest, with the priors of `config`: roll and pitch from the mean
+// specific force, gyro bias from the mean rate, heading and position zero by definition. Returns
+// the force without the prior bias, body [m/s^2].
+template <typename B, typename Scalar = typename B::Scalar>
+Vector3<Scalar> stand_still(B& belief, const AtRest<Scalar>& rest,
+                            const PrismConfig<Scalar>& config) {
+  const Vector3<Scalar> force = rest.accel - config.accelerometer_bias;
+  belief.rotation = shortest_rotation<Scalar>(force.normalized(), Vector3<Scalar>::UnitZ());
+  belief.gyro_bias = rest.gyro;
+  belief.accel_bias = config.accelerometer_bias;
+  const auto set = [&](int at, Scalar std) {
+    for (int k = at; k < at + 3; ++k) belief.covariance(k, k) = std * std;
+  };
+  set(B::kRotation, config.orientation_std);
+  belief.covariance(B::kRotation + 2, B::kRotation + 2) = 0;  // heading
+  set(B::kVelocity, config.velocity_std);
+  set(B::kPosition, config.position_std);
+  set(B::kGyroBias, config.static_bias_initialization
+                        ? config.gyroscope_std / std::sqrt(Scalar(rest.samples))
+                        : config.gyroscope_bias_std);
+  set(B::kAccelBias, config.accelerometer_bias_std);
+  return force;
+}
 
 template <typename Scalar>
 class StaticStart {

@@ -19,6 +19,7 @@
 #include "tensegrity/contact/detector.hpp"
 #include "tensegrity/estimator/activity.hpp"
 #include "tensegrity/estimator/config.hpp"
+#include "tensegrity/estimator/pending.hpp"
 #include "tensegrity/estimator/prism_state.hpp"
 #include "tensegrity/estimator/spin_start.hpp"
 #include "tensegrity/estimator/static_start.hpp"
@@ -74,7 +75,7 @@ class TightFilter {
   }
 
   // Lengths [m], NaN where a cable was not measured.
-  Status correct_cables(const CableLengths<Scalar>& lengths, Scalar, PrismHealth& health) {
+  Status correct_cables(Nanoseconds, const CableLengths<Scalar>& lengths, PrismHealth& health) {
     // With a cable missing there is no redundancy left to tell a wrong sensor from a wrong shape.
     complete_ = lengths.allFinite() ? std::min(complete_ + 1, kCompleteSamples) : 0;
     const Scalar gate = complete_ > 0 ? square(config_.cable_gate) : Scalar(0);
@@ -138,24 +139,9 @@ class TightFilter {
       return false;
     }
     belief_ = Belief(robot_);
-    const V3 force = rest.accel - config_.accelerometer_bias;
-    belief_.rotation = shortest_rotation<Scalar>(force.normalized(), V3::UnitZ());
-    belief_.gyro_bias = rest.gyro;
-    belief_.accel_bias = config_.accelerometer_bias;
-
+    const V3 force = stand_still(belief_, rest, config_);
     auto& p = belief_.covariance;
-    const auto set = [&](int at, Scalar std) {
-      p.diagonal().template segment<3>(at).setConstant(square(std));
-    };
-    set(Belief::kRotation, config_.orientation_std);
-    p(Belief::kRotation + 2, Belief::kRotation + 2) = 0;  // heading: zero by definition
-    set(Belief::kVelocity, config_.velocity_std);
-    set(Belief::kPosition, config_.position_std);
     p(Belief::kPosition + 2, Belief::kPosition + 2) = square(kStartHeightStd);
-    set(Belief::kGyroBias, config_.static_bias_initialization
-                               ? config_.gyroscope_std / std::sqrt(Scalar(rest.samples))
-                               : config_.gyroscope_bias_std);
-    set(Belief::kAccelBias, config_.accelerometer_bias_std);
     p.diagonal()
         .template segment<9>(Belief::kOffsets)
         .setConstant(square(config_.cable_offset_std));

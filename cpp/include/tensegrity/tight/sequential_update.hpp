@@ -41,17 +41,16 @@ class Row {
   template <typename Covariance>
   Vector<Scalar, Covariance::RowsAtCompileTime> cross(const Covariance& p) const {
     Vector<Scalar, Covariance::RowsAtCompileTime> c;
+    if (single_at_ >= 0) {
+      c = single_ * p.col(single_at_);
+    } else {
+      c.setZero();
+    }
     for (int k = 0; k < blocks_; ++k) {
       const int at = at_[std::size_t(k)];
       const Vector3<Scalar>& h = h_[std::size_t(k)];
-      const auto term = h[0] * p.col(at) + h[1] * p.col(at + 1) + h[2] * p.col(at + 2);
-      if (k == 0) {
-        c = term;
-      } else {
-        c += term;
-      }
+      c += h[0] * p.col(at) + h[1] * p.col(at + 1) + h[2] * p.col(at + 2);
     }
-    if (single_at_ >= 0) c += single_ * p.col(single_at_);
     return c;
   }
   // H x
