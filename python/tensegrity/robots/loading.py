@@ -5,12 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 from tensegrity.packaged import PackagedModels
+from tensegrity.robots.net import Net
 from tensegrity.robots.robot import Robot
 
 DEFAULT = "prism3"
 """The robot of recordings and files that name none."""
 
+DEFAULT_NET = "superball"
+"""The net that files build on when they name none."""
+
 _ROBOTS = PackagedModels(Robot, Path(__file__).parent, "robot", lambda content: DEFAULT)
+_NETS = PackagedModels(Net, Path(__file__).parent / "nets", "net", lambda content: DEFAULT_NET)
 
 
 def packaged() -> list[str]:
@@ -28,3 +33,16 @@ def load(name_or_path: str | Path = DEFAULT) -> Robot:
     Raises :class:`InputError` with file, line and key.
     """
     return _ROBOTS.load(name_or_path)
+
+
+def packaged_nets() -> list[str]:
+    """Names of the nets that come with the package."""
+    return _NETS.names()
+
+
+def load_net(name_or_path: str | Path = DEFAULT_NET) -> Net:
+    """A packaged net by name, or the net that a YAML file describes, by the rules of :func:`load`.
+
+    Raises :class:`InputError` with file, line and key.
+    """
+    return _NETS.load(name_or_path)
