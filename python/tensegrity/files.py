@@ -1,4 +1,4 @@
-"""Reading text with located errors, writing directories all at once or not at all."""
+"""Reading text with located errors, writing files and directories all at once or not at all."""
 
 from __future__ import annotations
 
@@ -44,6 +44,54 @@ def read_text(path: Path) -> str:
     return text
 
 
+def check_directory(path: Path, *, marker: str, overwrite: bool = False) -> None:
+    """Refuse a directory that must not be written, before work is spent on what goes there.
+
+    An empty or missing directory is free. A non-empty one is replaced only with ``overwrite``, and
+    only when it holds the file ``marker``, so that a mistyped path never costs anybody their home
+    directory.
+    """
+    if path.is_file():
+        raise InputError("is a file, a directory is expected", file=path)
+    if not path.is_dir() or not any(path.iterdir()):
+        return
+    if not (path / marker).is_file():
+        raise InputError(
+            f"is not empty and holds no {marker}: it will not be overwritten",
+            file=path,
+            hint="choose another directory",
+        )
+    if not overwrite:
+        raise InputError(
+            "exists and is not empty",
+            file=path,
+            hint="add --overwrite (in Python overwrite=True), or choose another directory",
+        )
+
+
+def check_file(path: Path, *, overwrite: bool = False) -> None:
+    """Refuse a file that cannot or must not be written, before work is spent on its content."""
+    if path.is_dir():
+        raise InputError("is a directory, a file is needed", file=path)
+    if not path.parent.is_dir():
+        raise InputError("its directory does not exist", file=path, hint="create it first")
+    if path.exists() and not overwrite:
+        raise InputError(
+            "exists already",
+            file=path,
+            hint="add --overwrite (in Python overwrite=True), or choose another file",
+        )
+
+
+def write_file(path: Path, content: str, *, overwrite: bool = False) -> None:
+    """A text file that appears at ``path`` complete or not at all (:func:`check_file`)."""
+    check_file(path, overwrite=overwrite)
+    with tempfile.TemporaryDirectory(prefix=f".{path.name}-", dir=path.parent) as staging:
+        new = Path(staging) / "new"
+        new.write_text(content, encoding="utf-8")
+        new.replace(path)
+
+
 @contextmanager
 def new_directory(path: Path, *, marker: str, overwrite: bool = False) -> Iterator[Path]:
     """A directory that appears at ``path`` complete or not at all.
@@ -51,25 +99,10 @@ def new_directory(path: Path, *, marker: str, overwrite: bool = False) -> Iterat
     Yields an empty temporary directory next to ``path`` to write into. When the block ends it takes
     the place of ``path``; when the block raises it is removed and ``path`` stays as it was.
 
-    A non-empty directory at ``path`` is replaced only with ``overwrite``, and only when it holds
-    the file ``marker``, so that a mistyped path never costs anybody their home directory.
+    What is there already is treated as :func:`check_directory` says.
     """
+    check_directory(path, marker=marker, overwrite=overwrite)
     target = path.resolve()
-    if target.exists() and not target.is_dir():
-        raise InputError("is a file, a directory is expected", file=path)
-    if target.is_dir() and any(target.iterdir()):
-        if not overwrite:
-            raise InputError(
-                "exists and is not empty",
-                file=path,
-                hint="choose another directory or ask to overwrite it",
-            )
-        if not (target / marker).is_file():
-            raise InputError(
-                f"will not be overwritten: it holds no {marker}",
-                file=path,
-                hint="choose another directory",
-            )
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         staging = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))

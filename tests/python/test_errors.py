@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tensegrity.errors import InputError, MissingExtraError, did_you_mean, quoted
-from tensegrity.files import new_directory, read_text
+from tensegrity.files import new_directory, read_text, write_file
 
 
 def test_input_error_names_file_line_field_and_hint() -> None:
@@ -81,6 +81,18 @@ def test_a_failed_overwrite_keeps_the_old_directory(tmp_path: Path) -> None:
         fail_while_writing(tmp_path / "a", overwrite=True)
     assert names(tmp_path) == ["a"]
     assert (tmp_path / "a" / "m").read_text() == "old"
+
+
+def test_a_file_appears_complete_or_not_at_all(tmp_path: Path) -> None:
+    file = tmp_path / "a.txt"
+    write_file(file, "old")
+    with pytest.raises(InputError, match="exists already"):
+        write_file(file, "new")
+    with pytest.raises(UnicodeEncodeError):
+        write_file(file, "half a \ud800", overwrite=True)
+    assert (names(tmp_path), file.read_text()) == (["a.txt"], "old")
+    write_file(file, "new", overwrite=True)
+    assert (names(tmp_path), file.read_text()) == (["a.txt"], "new")
 
 
 def test_overwriting_has_to_be_asked_for(tmp_path: Path) -> None:

@@ -1,8 +1,8 @@
 """The C++ filter against a dense one, written from the equations alone.
 
 The dense filter (T eqs. 4-14, biases as Hartley et al. 2020) never uses the block structure or the
-closed forms of the C++ code: means and transitions are matrix exponentials, groups are matrices. The
-noise of a sample is an error of its mean, a bias of that step alone; walks are added after it.
+closed forms of the C++ code: means and transitions are matrix exponentials, groups are matrices.
+The noise of a sample is an error of its mean, a bias of that step alone; walks are added after it.
 
 Over one sample the inputs are constant in the body frame, so the *left*-invariant error has a
 constant system matrix and scipy.linalg.expm is exact. The right-invariant error follows by the

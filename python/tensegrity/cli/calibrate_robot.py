@@ -14,7 +14,7 @@ from tensegrity.calibration import RobotCalibration
 from tensegrity.calibration.robot import OFFSET_STD_M
 from tensegrity.cli.console import out, progress_bar
 from tensegrity.config import FilterConfig
-from tensegrity.errors import InputError
+from tensegrity.files import check_file, write_file
 from tensegrity.sequence import read
 from tensegrity.yaml_model import dump
 
@@ -37,7 +37,7 @@ def calibrate_robot(
     ] = False,
 ) -> None:
     """Find the cables' offsets and how the IMU sits on its rod, and write the robot with them."""
-    _check_file(output, overwrite)
+    check_file(output, overwrite=overwrite)
     filter_config = FilterConfig.load(config)
     model = None if robot is None else robots.load(robot)
     recordings = [read(path, robot=model) for path in sequences]
@@ -48,27 +48,16 @@ def calibrate_robot(
     rows = _rows(result)
     names = ", ".join(recording.name for recording in recordings)
     found = "".join(f"#   {label}: {value} +- {std} {unit}\n" for label, value, std, unit in rows)
-    output.write_text(
+    write_file(
+        output,
         f"# Calibrated from {names}; standard deviations behind +-.\n{found}{dump(result.robot)}",
-        encoding="utf-8",
+        overwrite=overwrite,
     )
     table = Table("", *(Column(name, justify="right") for name in ("found", "±", "unit")))
     for row in rows:
         table.add_row(*row)
     out.print(table, soft_wrap=False)
     out.print(f"robot: {output}", markup=False)
-
-
-def _check_file(output: Path, overwrite: bool) -> None:
-    """Refuse a file that cannot or must not be written before work is spent on its content."""
-    if output.is_dir():
-        raise InputError("is a directory, a file is needed", file=output)
-    if not output.parent.is_dir():
-        raise InputError("its directory does not exist", file=output, hint="create it first")
-    if output.exists() and not overwrite:
-        raise InputError(
-            "exists already", file=output, hint="add --overwrite, or name another file with --out"
-        )
 
 
 def _rows(result: RobotCalibration) -> list[tuple[str, str, str, str]]:

@@ -12,10 +12,10 @@ from tensegrity import estimation, robots
 from tensegrity.cli.console import err, out, progress_bar
 from tensegrity.cli.evaluate import evaluate_run
 from tensegrity.cli.events import report_events
-from tensegrity.cli.output import check_output
 from tensegrity.config import FilterConfig
 from tensegrity.errors import InputError, MissingExtraError
 from tensegrity.evaluation import Alignment
+from tensegrity.files import check_directory
 from tensegrity.run import TRAJECTORY, write_run
 from tensegrity.sequence import read
 
@@ -57,7 +57,7 @@ def estimate(
     filter_config = choose_config(config, method)
     recording = read(sequence, robot=None if robot is None else robots.load(robot))
     directory = output or Path("runs") / f"{recording.name}-{filter_config.settings.method}"
-    check_output(directory, marker=TRAJECTORY, overwrite=overwrite)
+    check_directory(directory, marker=TRAJECTORY, overwrite=overwrite)
 
     with progress_bar(f"estimating {recording.name}") as progress:
         trajectory = estimation.estimate(recording, config=filter_config, progress=progress)

@@ -10,8 +10,8 @@ import typer
 from tensegrity import robots
 from tensegrity.cli.console import out, progress_bar
 from tensegrity.cli.model_options import with_options_of
-from tensegrity.cli.output import check_output
 from tensegrity.cli.recording import record
+from tensegrity.files import check_directory
 from tensegrity.sequence.directory import IMU
 from tensegrity.simulation import Manoeuvre, SimulationOptions
 
@@ -29,7 +29,7 @@ def simulate(
     """Simulate a rolling robot and its sensors, and write the recording with the truth."""
     chosen = SimulationOptions(**options)
     model = robots.load(robot)
-    check_output(output, marker=IMU, overwrite=overwrite)
+    check_directory(output, marker=IMU, overwrite=overwrite)
     with progress_bar(f"simulating {manoeuvre}") as progress:
         record(manoeuvre, chosen, model, output, progress)
     out.print(f"recording: {output}", markup=False)
