@@ -1,0 +1,401 @@
+// One strip of a calibration: the knots of a trajectory with all that depends on them.
+//
+// Its normal equations are block tridiagonal (a knot meets its neighbours through ranges between
+// them and through the motion prior), with a border of the few shared parameters that the strip's
+// ranges touch. Eliminating the knots leaves a dense system of the border alone (Schur complement);
+// the cost is linear in the number of knots.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "tensegrity/ranging/calibration_problem.hpp"
+#include "tensegrity/ranging/robust_loss.hpp"
+
+namespace tensegrity::ranging {
+
+template <typename Scalar, int Modules>
+class CalibrationStripSolver {
+ public:
+  static constexpr int kSize = 3 * Modules;  // coordinates of a knot
+  using Shared = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
+  using SharedMatrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+
+  // `index` is the strip's among those of the problem.
+  CalibrationStripSolver(const CalibrationProblem<Scalar>& problem, int index)
+      : knots_(problem.strips[index].knots),
+        range_std_(problem.range_std),
+        rod_information_(1 / (problem.rod_std * problem.rod_std)),
+        knot_information_(problem.knot_information),
+        motion_information_(problem.strips[index].motion_information) {
+    std::vector<int> local(problem.shared(), -1);
+    const auto column = [&](int shared) {
+      if (local[shared] < 0) {
+        local[shared] = static_cast<int>(border_.size());
+        border_.push_back(shared);
+      }
+      return local[shared];
+    };
+    for (std::size_t i = 0; i < problem.ranges.size(); ++i) {
+      const CalibrationRange<Scalar>& range = problem.ranges[i];
+      if (range.strip != index) continue;
+      Row row;
+      row.source = static_cast<int>(i);
+      row.at = kSize * range.knot + 3 * range.module;
+      row.knot = range.knot;
+      row.module = range.module;
+      row.blend = range.knot + 1 < knots_ ? range.blend : Scalar(0);
+      row.measured = range.range;
+      row.anchor = 3 * range.anchor;
+      for (int axis = 0; axis < 3; ++axis) row.columns[axis] = column(3 * range.anchor + axis);
+      for (int term : range.offset_terms) {
+        if (term < 0) continue;
+        row.offsets[row.offset_count] = 3 * problem.anchors + term;
+        row.columns[3 + row.offset_count] = column(3 * problem.anchors + term);
+        ++row.offset_count;
+      }
+      rows_.push_back(row);
+    }
+    std::stable_sort(rows_.begin(), rows_.end(),
+                     [](const Row& a, const Row& b) { return a.knot < b.knot; });
+    const int rod = problem.strips[index].rod_length;
+    if (Modules == 2 && rod >= 0) {
+      rod_ = 3 * problem.anchors + problem.offset_terms + rod;
+      rod_column_ = column(rod_);
+    }
+    width_ = static_cast<int>(border_.size());
+    positions_.assign(kSize * knots_, Scalar(0));
+    trial_ = positions_;
+    gradient_ = positions_;
+    step_ = positions_;
+    const std::size_t block = kSize * kSize;
+    diagonal_.resize(block * knots_);
+    coupling_.resize(block * knots_);
+    factor_.resize(block * knots_);
+    link_.resize(block * knots_);
+    cross_.resize(static_cast<std::size_t>(kSize) * width_ * knots_);
+    // One more column than the border: the eliminated gradient.
+    eliminated_.resize(static_cast<std::size_t>(kSize) * (width_ + 1) * knots_);
+    shared_information_.resize(static_cast<std::size_t>(width_) * width_);
+    shared_gradient_.resize(width_);
+    reduced_.resize(static_cast<std::size_t>(width_ + 1) * (width_ + 1));
+  }
+
+  std::vector<Scalar>& positions() { return positions_; }
+  const std::vector<Scalar>& positions() const { return positions_; }
+
+  // Half the loss at the positions (`at_trial`: at those of the last step) and shared parameters.
+  Scalar cost(const Shared& shared, const RobustLoss<Scalar>& loss, bool at_trial) const {
+    const std::vector<Scalar>& at = at_trial ? trial_ : positions_;
+    Scalar sum = 0;
+    for (const Row& row : rows_) {
+      const Scalar residual = evaluate(row, at, shared).residual;
+      sum += loss.value(residual * residual);
+    }
+    for (int k = 0; k + 1 < knots_; ++k) {
+      for (int i = kSize * k; i < kSize * (k + 1); ++i) {
+        const Scalar moved = at[i + kSize] - at[i];
+        sum += motion_information_[k] * moved * moved;
+      }
+    }
+    for (const Scalar x : at) sum += knot_information_ * x * x;
+    if constexpr (Modules == 2) {
+      if (rod_ >= 0) {
+        for (int k = 0; k < knots_; ++k) {
+          const Scalar error = rod(at.data() + kSize * k).length - shared[rod_];
+          sum += rod_information_ * error * error;
+        }
+      }
+    }
+    return sum / 2;
+  }
+
+  // Gauss-Newton normal equations at the positions, with the robust loss as weights.
+  void linearise(const Shared& shared, const RobustLoss<Scalar>& loss) {
+    clear();
+    for (const Row& row : rows_) add_range(row, shared, loss);
+    for (int k = 0; k + 1 < knots_; ++k) add_motion(k);
+    for (int k = 0; k < knots_; ++k) {
+      for (int i = 0; i < kSize; ++i) {
+        diagonal(k, i, i) += knot_information_;
+        gradient_[kSize * k + i] += knot_information_ * positions_[kSize * k + i];
+      }
+    }
+    if constexpr (Modules == 2) {
+      if (rod_ >= 0) {
+        for (int k = 0; k < knots_; ++k) add_rod(k, shared);
+      }
+    }
+  }
+
+  // Adds what the strip's ranges say about the shared parameters directly.
+  void add_shared(SharedMatrix& information, Shared& gradient) const {
+    for (int i = 0; i < width_; ++i) {
+      gradient[border_[i]] += shared_gradient_[i];
+      for (int j = 0; j < width_; ++j) {
+        information(border_[i], border_[j]) += shared_information_[i * width_ + j];
+      }
+    }
+  }
+
+  // Eliminates the knots and takes what they explain off the shared system. `damping` multiplies
+  // the diagonal (Marquardt). False if a block is not positive definite.
+  bool eliminate(Scalar damping, SharedMatrix& information, Shared& gradient) {
+    std::fill(reduced_.begin(), reduced_.end(), Scalar(0));
+    const int columns = width_ + 1;
+    for (int k = 0; k < knots_; ++k) {
+      Scalar* factor = &factor_[kSize * kSize * k];
+      std::copy_n(&diagonal_[kSize * kSize * k], kSize * kSize, factor);
+      for (int i = 0; i < kSize; ++i) factor[i * kSize + i] *= 1 + damping;
+      Scalar* block = &eliminated_[static_cast<std::size_t>(kSize) * columns * k];
+      std::copy_n(&cross_[static_cast<std::size_t>(kSize) * width_ * k], kSize * width_, block);
+      std::copy_n(&gradient_[kSize * k], kSize, block + kSize * width_);
+      if (k > 0) {
+        const Scalar* link = &link_[kSize * kSize * (k - 1)];
+        subtract_product(link, link, kSize, factor);
+        subtract_product(link, block - kSize * columns, columns, block);
+      }
+      if (!cholesky(factor)) return false;
+      Scalar* link = &link_[kSize * kSize * k];
+      std::copy_n(&coupling_[kSize * kSize * k], kSize * kSize, link);
+      forward(factor, link, kSize);
+      forward(factor, block, columns);
+      for (int j = 0; j < columns; ++j) {
+        const Scalar* b = block + kSize * j;
+        Scalar* out = &reduced_[columns * j];
+        for (int i = 0; i <= j; ++i) out[i] += dot(block + kSize * i, b);
+      }
+    }
+    for (int j = 0; j < width_; ++j) {
+      gradient[border_[j]] -= reduced_[columns * width_ + j];
+      for (int i = 0; i <= j; ++i) {
+        information(border_[i], border_[j]) -= reduced_[columns * j + i];
+        if (i != j) information(border_[j], border_[i]) -= reduced_[columns * j + i];
+      }
+    }
+    return true;
+  }
+
+  // The step of the knots that goes with the step of the shared parameters; makes the trial.
+  void substitute(const Shared& shared_step) {
+    const int columns = width_ + 1;
+    for (int k = knots_ - 1; k >= 0; --k) {
+      const Scalar* block = &eliminated_[static_cast<std::size_t>(kSize) * columns * k];
+      Scalar* x = &step_[kSize * k];
+      for (int i = 0; i < kSize; ++i) x[i] = -block[kSize * width_ + i];
+      for (int j = 0; j < width_; ++j) {
+        const Scalar s = shared_step[border_[j]];
+        for (int i = 0; i < kSize; ++i) x[i] -= block[kSize * j + i] * s;
+      }
+      if (k + 1 < knots_) {
+        const Scalar* link = &link_[kSize * kSize * k];
+        for (int j = 0; j < kSize; ++j) {
+          for (int i = 0; i < kSize; ++i) x[i] -= link[kSize * j + i] * x[kSize + j];
+        }
+      }
+      const Scalar* factor = &factor_[kSize * kSize * k];
+      for (int i = kSize - 1; i >= 0; --i) {
+        for (int j = i + 1; j < kSize; ++j) x[i] -= factor[kSize * i + j] * x[j];
+        x[i] /= factor[kSize * i + i];
+      }
+    }
+    for (std::size_t i = 0; i < trial_.size(); ++i) trial_[i] = positions_[i] + step_[i];
+  }
+
+  void accept() { positions_.swap(trial_); }
+
+  // Whitened residuals of the strip's ranges, at their place among those of the problem.
+  void residuals(const Shared& shared, std::vector<Scalar>& out) const {
+    for (const Row& row : rows_) out[row.source] = evaluate(row, positions_, shared).residual;
+  }
+
+ private:
+  struct Row {
+    int source = 0;  // among the problem's ranges
+    int knot = 0;
+    int module = 0;
+    int at = 0;  // first coordinate of the module at the knot
+    Scalar blend = 0;
+    Scalar measured = 0;
+    int anchor = 0;       // first coordinate among the shared parameters
+    int offsets[4] = {};  // among the shared parameters
+    int columns[7] = {};  // of the anchor's coordinates and the offset terms in the border
+    int offset_count = 0;
+  };
+
+  struct Evaluated {
+    Scalar residual;      // whitened
+    Scalar direction[3];  // from the anchor to the module, divided by range_std
+  };
+
+  struct Rod {
+    Scalar length;
+    Scalar direction[3];  // from module 0 to module 1
+  };
+
+  // Below this the direction of a distance is arbitrary; a module never sits inside an anchor.
+  static constexpr Scalar kClosest = Scalar(1e-6);  // [m]
+
+  Evaluated evaluate(const Row& row, const std::vector<Scalar>& at, const Shared& shared) const {
+    Evaluated result;
+    Scalar squared = 0;
+    const bool between = row.blend > 0;
+    for (int i = 0; i < 3; ++i) {
+      Scalar x = at[row.at + i];
+      if (between) x += row.blend * (at[row.at + kSize + i] - x);
+      result.direction[i] = x - shared[row.anchor + i];
+      squared += result.direction[i] * result.direction[i];
+    }
+    const Scalar distance = std::max(std::sqrt(squared), kClosest);
+    for (Scalar& d : result.direction) d /= distance * range_std_;
+    Scalar predicted = distance;
+    for (int i = 0; i < row.offset_count; ++i) predicted += shared[row.offsets[i]];
+    result.residual = (predicted - row.measured) / range_std_;
+    return result;
+  }
+
+  static Rod rod(const Scalar* knot) {
+    Rod result;
+    Scalar squared = 0;
+    for (int i = 0; i < 3; ++i) {
+      result.direction[i] = knot[3 + i] - knot[i];
+      squared += result.direction[i] * result.direction[i];
+    }
+    result.length = std::max(std::sqrt(squared), kClosest);
+    for (Scalar& d : result.direction) d /= result.length;
+    return result;
+  }
+
+  void clear() {
+    for (auto* all :
+         {&gradient_, &diagonal_, &coupling_, &cross_, &shared_information_, &shared_gradient_}) {
+      std::fill(all->begin(), all->end(), Scalar(0));
+    }
+  }
+
+  Scalar& diagonal(int k, int i, int j) { return diagonal_[kSize * (kSize * k + j) + i]; }
+  Scalar& coupling(int k, int i, int j) { return coupling_[kSize * (kSize * k + j) + i]; }
+  Scalar& cross(int k, int i, int column) {
+    return cross_[static_cast<std::size_t>(kSize) * (width_ * k + column) + i];
+  }
+
+  void add_range(const Row& row, const Shared& shared, const RobustLoss<Scalar>& loss) {
+    const Evaluated e = evaluate(row, positions_, shared);
+    const Scalar weight = loss.weight(e.residual * e.residual);
+    Scalar slopes[7];  // of the residual, by the row's border columns
+    for (int i = 0; i < 3; ++i) slopes[i] = -e.direction[i];
+    for (int i = 0; i < row.offset_count; ++i) slopes[3 + i] = 1 / range_std_;
+    const int columns = 3 + row.offset_count;
+    const int first = 3 * row.module;
+    const Scalar share[2] = {1 - row.blend, row.blend};
+    const int ends = row.blend > 0 ? 2 : 1;
+    for (int end = 0; end < ends; ++end) {
+      const int k = row.knot + end;
+      for (int i = 0; i < 3; ++i) {
+        const Scalar slope = weight * share[end] * e.direction[i];
+        gradient_[kSize * k + first + i] += slope * e.residual;
+        for (int j = 0; j < 3; ++j) {
+          diagonal(k, first + i, first + j) += slope * share[end] * e.direction[j];
+          if (end == 0 && ends == 2) {
+            coupling(k, first + i, first + j) += slope * share[1] * e.direction[j];
+          }
+        }
+        for (int c = 0; c < columns; ++c) cross(k, first + i, row.columns[c]) += slope * slopes[c];
+      }
+    }
+    for (int a = 0; a < columns; ++a) {
+      shared_gradient_[row.columns[a]] += weight * slopes[a] * e.residual;
+      for (int b = 0; b < columns; ++b) {
+        shared_information_[row.columns[a] * width_ + row.columns[b]] +=
+            weight * slopes[a] * slopes[b];
+      }
+    }
+  }
+
+  void add_motion(int k) {
+    const Scalar information = motion_information_[k];
+    for (int i = 0; i < kSize; ++i) {
+      const Scalar force =
+          information * (positions_[kSize * (k + 1) + i] - positions_[kSize * k + i]);
+      gradient_[kSize * k + i] -= force;
+      gradient_[kSize * (k + 1) + i] += force;
+      diagonal(k, i, i) += information;
+      diagonal(k + 1, i, i) += information;
+      coupling(k, i, i) -= information;
+    }
+  }
+
+  void add_rod(int k, const Shared& shared) {
+    const Rod r = rod(&positions_[kSize * k]);
+    const Scalar error = r.length - shared[rod_];
+    for (int i = 0; i < kSize; ++i) {
+      const Scalar slope = (i < 3 ? -1 : 1) * rod_information_ * r.direction[i % 3];
+      gradient_[kSize * k + i] += slope * error;
+      for (int j = 0; j < kSize; ++j) {
+        diagonal(k, i, j) += slope * (j < 3 ? -1 : 1) * r.direction[j % 3];
+      }
+      cross(k, i, rod_column_) -= slope;
+    }
+    shared_gradient_[rod_column_] -= rod_information_ * error;
+    shared_information_[rod_column_ * width_ + rod_column_] += rod_information_;
+  }
+
+  static Scalar dot(const Scalar* a, const Scalar* b) {
+    Scalar sum = 0;
+    for (int i = 0; i < kSize; ++i) sum += a[i] * b[i];
+    return sum;
+  }
+
+  // out -= transpose(a) * b, a of kSize x kSize, b and out of kSize x columns; column-major.
+  static void subtract_product(const Scalar* a, const Scalar* b, int columns, Scalar* out) {
+    for (int j = 0; j < columns; ++j) {
+      for (int i = 0; i < kSize; ++i) out[kSize * j + i] -= dot(a + kSize * i, b + kSize * j);
+    }
+  }
+
+  // Lower triangle of a by Cholesky, in place.
+  static bool cholesky(Scalar* a) {
+    for (int j = 0; j < kSize; ++j) {
+      Scalar pivot = a[kSize * j + j];
+      for (int m = 0; m < j; ++m) pivot -= a[kSize * m + j] * a[kSize * m + j];
+      if (!(pivot > 0)) return false;
+      pivot = std::sqrt(pivot);
+      a[kSize * j + j] = pivot;
+      for (int i = j + 1; i < kSize; ++i) {
+        Scalar sum = a[kSize * j + i];
+        for (int m = 0; m < j; ++m) sum -= a[kSize * m + i] * a[kSize * m + j];
+        a[kSize * j + i] = sum / pivot;
+      }
+    }
+    return true;
+  }
+
+  // Columns of b become those of L^-1 b.
+  static void forward(const Scalar* lower, Scalar* b, int columns) {
+    Scalar inverse[kSize];
+    for (int i = 0; i < kSize; ++i) inverse[i] = 1 / lower[kSize * i + i];
+    for (int c = 0; c < columns; ++c, b += kSize) {
+      for (int j = 0; j < kSize; ++j) {
+        b[j] *= inverse[j];
+        for (int i = j + 1; i < kSize; ++i) b[i] -= lower[kSize * j + i] * b[j];
+      }
+    }
+  }
+
+  int knots_;
+  Scalar range_std_, rod_information_, knot_information_;
+  std::vector<Scalar> motion_information_;
+  std::vector<Row> rows_;
+  std::vector<int> border_;  // the shared parameter of each column
+  int width_ = 0;
+  int rod_ = -1;  // among the shared parameters
+  int rod_column_ = -1;
+  std::vector<Scalar> positions_, trial_, step_, gradient_;
+  std::vector<Scalar> diagonal_, coupling_, cross_;           // normal equations, column-major
+  std::vector<Scalar> factor_, link_, eliminated_, reduced_;  // and what elimination makes of them
+  std::vector<Scalar> shared_information_, shared_gradient_;
+};
+
+}  // namespace tensegrity::ranging
