@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from tensegrity.robots import Robot
 from tensegrity.sequence.sequence import CableStream, ContactStream, ImuStream
-from tensegrity.simulation.options import SimulationOptions
-from tensegrity.simulation.world import GRAVITY, STEP_S
+from tensegrity.simulation.options import ImuSampling, SimulationOptions
+from tensegrity.simulation.rigid_bodies import GRAVITY, STEP_S
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -70,7 +70,8 @@ def imu_stream(
     Row :data:`IMU_STEPS` of ``motion`` is time zero: the first sample covers what comes before.
     Biases start at zero and walk.
     """
-    gyro, accel = (values @ mounting for values in inertial_samples(motion, options))
+    samples = inertial_samples(motion, IMU_STEPS, options.imu_sampling)
+    gyro, accel = (values @ mounting for values in samples)
     for values, noise, walk in (
         (gyro, options.gyro_noise, options.gyro_bias_walk),
         (accel, options.accel_noise, options.accel_bias_walk),
@@ -82,10 +83,10 @@ def imu_stream(
 
 
 def inertial_samples(
-    motion: FrameMotion, options: SimulationOptions
+    motion: FrameMotion, steps: int, sampling: ImuSampling
 ) -> tuple[FloatArray, FloatArray]:
     """Angular velocity (M, 3) [rad/s] and specific force (M, 3) [m/s^2] in the frame, one row per
-    IMU sample, free of noise.
+    ``steps`` of the simulation, free of noise.
 
     Both are what moves the simulation: a step integrates the velocities at its *end*, and the
     specific force of a step is the change of velocity it makes. Integrating the samples leads
@@ -95,11 +96,11 @@ def inertial_samples(
     acceleration = np.diff(motion.velocity, axis=0) / STEP_S - GRAVITY
     middle = motion.rotation[:-1] * Rotation.from_rotvec(rate * STEP_S / 2)
     force = middle.inv().apply(acceleration)
-    samples = len(rate) // IMU_STEPS
-    shape = (samples, IMU_STEPS, 3)
-    rate = rate[: samples * IMU_STEPS].reshape(shape)
-    force = force[: samples * IMU_STEPS].reshape(shape)
-    if options.imu_sampling == "instantaneous":
+    samples = len(rate) // steps
+    shape = (samples, steps, 3)
+    rate = rate[: samples * steps].reshape(shape)
+    force = force[: samples * steps].reshape(shape)
+    if sampling == "instantaneous":
         return rate[:, -1].copy(), force[:, -1].copy()
     return rate.mean(axis=1), force.mean(axis=1)
 

@@ -17,6 +17,7 @@ from tensegrity.simulation.failures import lost_cable_index, with_gaps, without_
 from tensegrity.simulation.gait import FACES, Gait
 from tensegrity.simulation.manoeuvres import Manoeuvre
 from tensegrity.simulation.options import SimulationOptions
+from tensegrity.simulation.rigid_bodies import STEP_S
 from tensegrity.simulation.sensors import (
     IMU_PERIOD_S,
     IMU_STEPS,
@@ -26,7 +27,7 @@ from tensegrity.simulation.sensors import (
     stamps,
 )
 from tensegrity.simulation.state_log import StateLog
-from tensegrity.simulation.world import STEP_S, World
+from tensegrity.simulation.world import World
 
 FloatArray = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -174,13 +175,17 @@ def _settle(world: World) -> None:
     )
 
 
-def _stand(log: StateLog, duration_s: float) -> None:
+def _stand(log: StateLog[World], duration_s: float) -> None:
     for _ in range(round(duration_s / STEP_S)):
         log.step()
 
 
 def _roll(
-    log: StateLog, gait: Gait, cable_speed: float, path_length: float, progress: Progress | None
+    log: StateLog[World],
+    gait: Gait,
+    cable_speed: float,
+    path_length: float,
+    progress: Progress | None,
 ) -> None:
     """Roll until the horizontal path of the centre of mass is ``path_length`` [m]."""
     world = log.world
@@ -212,7 +217,7 @@ def _roll(
         progress(1.0)
 
 
-def _come_to_rest(log: StateLog) -> None:
+def _come_to_rest(log: StateLog[World]) -> None:
     for _ in range(round(_LONGEST_COMING_TO_REST_S / STEP_S)):
         if log.world.largest_speed() < _STILL_SPEED:
             return
@@ -226,7 +231,7 @@ def _at_samples(count: int) -> slice:
 
 def _recording(
     name: str,
-    log: StateLog,
+    log: StateLog[World],
     options: SimulationOptions,
     imu_turns: FloatArray,
     rngs: list[np.random.Generator],

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+from typing import Generic, TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from tensegrity.simulation.rigid_bodies import RigidBodies
 from tensegrity.simulation.sensors import FrameMotion
-from tensegrity.simulation.world import World
 
 FloatArray = NDArray[np.float64]
 
 _FIRST_CAPACITY = 65_536  # one minute
 
+WorldT = TypeVar("WorldT", bound=RigidBodies)
 
-class StateLog:
+
+class StateLog(Generic[WorldT]):
     """Steps a world and keeps every state, with the contact forces that act in it.
 
     Whole rows of MuJoCo's arrays are copied, everything else is computed afterwards for all steps
     at once: a step in Python then costs little more than the physics.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: WorldT) -> None:
         self.world = world
         self.steps = 0
         self._positions = np.empty((_FIRST_CAPACITY, world.model.nq))
@@ -41,11 +45,11 @@ class StateLog:
         self.steps = row + 1
 
     def normal_forces(self) -> FloatArray:
-        """Between endcaps and ground (N, 6) [N]."""
+        """What the world's touch sensors feel between endcaps and ground (N, sensors) [N]."""
         return self._forces[: self.steps]
 
     def rod(self, index: int) -> FrameMotion:
-        """Motion of a rod's centre, z toward its even endcap."""
+        """Motion of a rod's centre, z along the rod."""
         position = self._positions[: self.steps, 7 * index : 7 * index + 7]
         velocity = self._velocities[: self.steps, 6 * index : 6 * index + 6]
         # MuJoCo: quaternions w, x, y, z; linear velocity in the world, angular in the body.
