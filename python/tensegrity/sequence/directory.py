@@ -55,7 +55,7 @@ class DirectoryReader:
                 raise InputError(
                     "no such file", file=path / required, hint="every sequence needs this file"
                 )
-        imu = _read_imu(path / IMU)
+        imu = read_imu(path / IMU)
         contacts, groundtruth, endcaps = (path / f for f in (CONTACTS, GROUNDTRUTH, ENDCAPS))
         sequence = Sequence(
             name=path.resolve().name,
@@ -66,7 +66,7 @@ class DirectoryReader:
             groundtruth=read_poses(groundtruth) if groundtruth.exists() else None,
             endcaps=read_endcaps(endcaps, robot) if endcaps.exists() else None,
             other_imus={
-                file.stem.removeprefix("imu_"): _read_imu(file)
+                file.stem.removeprefix("imu_"): read_imu(file)
                 for file in sorted(path.glob("imu_*.csv"))
             },
         )
@@ -84,9 +84,9 @@ def write(sequence: Sequence, path: str | Path, *, overwrite: bool = False) -> N
     robot = sequence.robot
     with new_directory(Path(path), marker=IMU, overwrite=overwrite) as folder:
         (folder / ROBOT).write_text(dump(robot), encoding="utf-8")
-        _write_imu(folder / IMU, sequence.imu)
+        write_imu(folder / IMU, sequence.imu)
         for name, imu in sequence.other_imus.items():
-            _write_imu(folder / f"imu_{name}.csv", imu)
+            write_imu(folder / f"imu_{name}.csv", imu)
         cables = sequence.cables
         write_csv(folder / CABLES, cable_columns(robot), cables.t_ns, cables.lengths)
         if sequence.contacts is not None:
@@ -96,6 +96,17 @@ def write(sequence: Sequence, path: str | Path, *, overwrite: bool = False) -> N
             write_poses(folder / GROUNDTRUTH, sequence.groundtruth)
         if sequence.endcaps is not None:
             write_endcaps(folder / ENDCAPS, sequence.endcaps)
+
+
+def read_imu(file: Path) -> ImuStream:
+    """Samples of one IMU from its CSV file."""
+    table = read_csv(file, _IMU_COLUMNS)
+    return ImuStream(table.t_ns, table.values[:, :3].copy(), table.values[:, 3:].copy())
+
+
+def write_imu(file: Path, imu: ImuStream) -> None:
+    """Write what :func:`read_imu` reads."""
+    write_csv(file, _IMU_COLUMNS, imu.t_ns, np.hstack([imu.gyro, imu.accel]))
 
 
 def read_endcaps(file: Path, robot: Robot) -> EndcapStream:
@@ -135,15 +146,6 @@ def contact_columns(robot: Robot) -> list[Column]:
 
 def _endcap_columns(count: int) -> list[Column]:
     return [Column(f"q_{i}_{axis}", "a finite number [m]") for i in range(count) for axis in "xyz"]
-
-
-def _read_imu(file: Path) -> ImuStream:
-    table = read_csv(file, _IMU_COLUMNS)
-    return ImuStream(table.t_ns, table.values[:, :3].copy(), table.values[:, 3:].copy())
-
-
-def _write_imu(file: Path, imu: ImuStream) -> None:
-    write_csv(file, _IMU_COLUMNS, imu.t_ns, np.hstack([imu.gyro, imu.accel]))
 
 
 def _read_cables(file: Path, robot: Robot) -> CableStream:
