@@ -19,5 +19,6 @@ void bind_estimator(py::module_& m);
 void bind_ranging_calibration(py::module_& m);
 void bind_ahrs(py::module_& m);
 void bind_ranging(py::module_& m);
+void bind_ukf(py::module_& m);
 
 }  // namespace tensegrity::bindings

@@ -12,4 +12,5 @@ PYBIND11_MODULE(_core, m) {
   bind_ranging_calibration(m);
   bind_ahrs(m);
   bind_ranging(m);
+  bind_ukf(m);
 }

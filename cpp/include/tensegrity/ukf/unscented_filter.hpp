@@ -15,7 +15,8 @@
 // twice the digits: for single precision, or states whose variances differ by more than 1e10.
 //
 // Memory is taken in the constructor, none afterwards. Whatever comes in, the mean stays finite
-// and the covariance finite, symmetric and positive semidefinite.
+// and the covariance finite, symmetric and positive semidefinite (the covariance form: to the
+// rounding of the covariance that a correction subtracts from).
 #pragma once
 
 #include <cmath>
@@ -91,6 +92,16 @@ class UnscentedFilter {
     cholesky<Scalar>(covariance, root_);
     root_is_current_ = true;
     if (!form_is_root()) take_covariance(covariance);
+    points_are_drawn_ = false;
+    return Status::kOk;
+  }
+
+  // Replaces the mean, the covariance stays: for a constraint that a linear correction misses to
+  // second order. kNotFinite: nothing is done.
+  Status move(const ConstVectorRef<Scalar>& mean) {
+    if (mean.size() != dimension_) return Status::kOutOfRange;
+    if (!mean.allFinite()) return Status::kNotFinite;
+    mean_ = mean;
     points_are_drawn_ = false;
     return Status::kOk;
   }
