@@ -83,8 +83,8 @@ class TightFilter {
     {
       tight::SequentialUpdate<Scalar> update(belief_);
       result = tight::correct_cables(update, belief_, lengths, config_.cable_std, gate);
-      tight::hold_rods(update, belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
     }
+    hold_rods();
     if (++cable_samples_ % kFoldEvery == 0) {
       tight::hold_fold(belief_, robot_, kFoldThreshold, kFoldStd);
     }
@@ -168,10 +168,7 @@ class TightFilter {
         update.correct(row, z[k], square(config_.accelerometer_std) / Scalar(rest.samples));
       }
     }
-    {
-      tight::SequentialUpdate<Scalar> update(belief_);
-      tight::hold_rods(update, belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
-    }
+    hold_rods();
     detector_.reset();
     started_ = true;
     return true;
@@ -242,6 +239,13 @@ class TightFilter {
     if (rod == 0) return std::numeric_limits<Scalar>::quiet_NaN();
     const RodImu& imu = rod_imus_[std::size_t(rod - 1)];
     return imu.fresh ? imu.gyro.z() - imu.bias.z() : std::numeric_limits<Scalar>::quiet_NaN();
+  }
+
+  // In a batch of its own: with a cable missing the cables alone move endcaps far, and the rods'
+  // lengths linearised before that would be another robot's.
+  void hold_rods() {
+    tight::SequentialUpdate<Scalar> update(belief_);
+    tight::hold_rods(update, belief_, robot_.rod_length, kRodLengthStd, kRodStretchStd);
   }
 
   void correct_rods() {

@@ -112,7 +112,7 @@ class SequentialUpdate {
   }
 
  private:
-  static constexpr int kCapacity = 16;  // nine cables with two rods are 13, three feet 12
+  static constexpr int kCapacity = 12;  // of three feet, and of nine cables
 
   void downdate() {
     for (int k = 0; k < waiting_; ++k) gains_.col(k) *= applied_[std::size_t(k)];
