@@ -105,7 +105,7 @@ class CalibrationStripSolver {
       if (rod_ >= 0) {
         for (int k = 0; k < knots_; ++k) {
           const Scalar error = rod(at.data() + kSize * k).length - shared[rod_];
-          sum += rod_information_ * error * error;
+          sum += loss.value(rod_information_ * error * error);
         }
       }
     }
@@ -125,7 +125,7 @@ class CalibrationStripSolver {
     }
     if constexpr (Modules == 2) {
       if (rod_ >= 0) {
-        for (int k = 0; k < knots_; ++k) add_rod(k, shared);
+        for (int k = 0; k < knots_; ++k) add_rod(k, shared, loss);
       }
     }
   }
@@ -140,15 +140,20 @@ class CalibrationStripSolver {
     }
   }
 
-  // Eliminates the knots and takes what they explain off the shared system. `damping` multiplies
-  // the diagonal (Marquardt). False if a block is not positive definite.
+  // Eliminates the knots and takes what they explain off the shared system. `damping` is relative
+  // to the diagonal (Marquardt) plus that of one range: where a knot is hardly measured, the
+  // diagonal alone would let it step far beyond what the linearisation is good for. False if a
+  // block is not positive definite.
   bool eliminate(Scalar damping, SharedMatrix& information, Shared& gradient) {
     std::fill(reduced_.begin(), reduced_.end(), Scalar(0));
     const int columns = width_ + 1;
+    const Scalar range_information = 1 / (range_std_ * range_std_);
     for (int k = 0; k < knots_; ++k) {
       Scalar* factor = &factor_[kSize * kSize * k];
       std::copy_n(&diagonal_[kSize * kSize * k], kSize * kSize, factor);
-      for (int i = 0; i < kSize; ++i) factor[i * kSize + i] *= 1 + damping;
+      for (int i = 0; i < kSize; ++i) {
+        factor[i * kSize + i] += damping * (factor[i * kSize + i] + range_information);
+      }
       Scalar* block = &eliminated_[static_cast<std::size_t>(kSize) * columns * k];
       std::copy_n(&cross_[static_cast<std::size_t>(kSize) * width_ * k], kSize * width_, block);
       std::copy_n(&gradient_[kSize * k], kSize, block + kSize * width_);
@@ -327,19 +332,20 @@ class CalibrationStripSolver {
     }
   }
 
-  void add_rod(int k, const Shared& shared) {
+  void add_rod(int k, const Shared& shared, const RobustLoss<Scalar>& loss) {
     const Rod r = rod(&positions_[kSize * k]);
     const Scalar error = r.length - shared[rod_];
+    const Scalar information = rod_information_ * loss.weight(rod_information_ * error * error);
     for (int i = 0; i < kSize; ++i) {
-      const Scalar slope = (i < 3 ? -1 : 1) * rod_information_ * r.direction[i % 3];
+      const Scalar slope = (i < 3 ? -1 : 1) * information * r.direction[i % 3];
       gradient_[kSize * k + i] += slope * error;
       for (int j = 0; j < kSize; ++j) {
         diagonal(k, i, j) += slope * (j < 3 ? -1 : 1) * r.direction[j % 3];
       }
       cross(k, i, rod_column_) -= slope;
     }
-    shared_gradient_[rod_column_] -= rod_information_ * error;
-    shared_information_[rod_column_ * width_ + rod_column_] += rod_information_;
+    shared_gradient_[rod_column_] -= information * error;
+    shared_information_[rod_column_ * width_ + rod_column_] += information;
   }
 
   static Scalar dot(const Scalar* a, const Scalar* b) {
