@@ -13,11 +13,21 @@ from tensegrity.yaml_model.model import INCONSISTENT
 ImuSampling = Literal["interval_mean", "instantaneous"]
 
 
-class SimulationOptions(StrictModel):
+class Options(StrictModel):
+    """Options given as keywords. Unknown or impossible values raise :class:`InputError` with field,
+    range and unit."""
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise _input_error(type(self), error) from None
+
+
+class SimulationOptions(Options):
     """World, robot variants, motion and sensors of a simulated recording.
 
-    The defaults are T's simulation: flat ground and the noise of T Table I. Unknown or impossible
-    values raise :class:`InputError` with field, range and unit.
+    The defaults are T's simulation: flat ground and the noise of T Table I.
     """
 
     seed: int = field("the same seed gives identical recordings", default=0, ge=0)
@@ -132,23 +142,17 @@ class SimulationOptions(StrictModel):
             )
         return self
 
-    def __init__(self, **values: Any) -> None:
-        try:
-            super().__init__(**values)
-        except ValidationError as error:
-            raise _input_error(error) from None
 
-
-def _input_error(error: ValidationError) -> InputError:
+def _input_error(options: type[Options], error: ValidationError) -> InputError:
     """The first problem, in the words of the field."""
     detail = error.errors()[0]
     if detail["type"] == INCONSISTENT:
         first, *others = detail["ctx"]["fields"]
         return InputError(detail["msg"], field=first, hint=f"change it or {', '.join(others)}")
     name = str(detail["loc"][0])
-    info = SimulationOptions.model_fields.get(name)
+    info = options.model_fields.get(name)
     if info is None:
-        hint = did_you_mean(name, SimulationOptions.model_fields)
+        hint = did_you_mean(name, options.model_fields)
         return InputError("unknown simulation option", field=name, hint=hint)
     unit = unit_of(info)
     expected = detail["msg"][0].lower() + detail["msg"][1:] + (f" [{unit}]" if unit else "")

@@ -31,8 +31,9 @@ _DOF_OF_ROD, _SPIN_DOF = 6, 5
 class NetWorld(RigidBodies):
     """The rods of a net as rigid bodies with a point mass at either end, on level ground.
 
-    Body k + 1 is rod k of the net, body frame at the rod's centre with z toward the rod's first
-    end. Control k is the rest length of cable k.
+    Body k + 1 is rod k of the net, body frame at the rod's centre with z toward the end with the
+    lower id. ``ends`` (rods, 2) are the indices of the nodes at the rods' ends, that one first.
+    Control k is the rest length of cable k.
     """
 
     def __init__(
@@ -44,7 +45,9 @@ class NetWorld(RigidBodies):
         """
         super().__init__()
         self.net = net
-        self._ends = net.rod_ends()
+        self.ends = np.array(
+            [sorted(ends, key=net.node_ids.__getitem__) for ends in net.rod_ends()]
+        )
         self._half_length = net.rod_length / 2
         self.model = self._compile(positions, soft_contact(friction, floor_time_constant))
         self.model.dof_damping[_SPIN_DOF::_DOF_OF_ROD] = _SPIN_DAMPING
@@ -65,14 +68,14 @@ class NetWorld(RigidBodies):
         centres = self.data.xpos[1:]
         axes = self._half_length * self.data.xmat[1:, 2::3]
         nodes = np.empty((len(self.net.nodes), 3))
-        nodes[self._ends[:, 0]] = centres + axes
-        nodes[self._ends[:, 1]] = centres - axes
+        nodes[self.ends[:, 0]] = centres + axes
+        nodes[self.ends[:, 1]] = centres - axes
         return nodes
 
     def _compile(self, positions: FloatArray, contact: dict[str, object]) -> mujoco.MjModel:
         spec = self.new_spec()
         self.add_ground(spec, _UP, contact)
-        for first, second in self._ends.tolist():
+        for first, second in self.ends.tolist():
             self._add_rod(spec, positions, first, second, contact)
         for index, (i, j) in enumerate(self.net.cable_ends().tolist()):
             cable = self.net.cables[index]
