@@ -68,18 +68,18 @@ TEST_CASE("columns, outer products and mirrors of part of a covariance") {
     p.topLeftCorner(size, size).setRandom();
     P columns = p;
     const tensegrity::Matrix3<double> m = tensegrity::Matrix3<double>::Random();
-    add_columns(columns, 0, 9, m, size);
+    tensegrity::add_columns(columns, 0, 9, m, size);
     P expected = p;
     expected.middleCols<3>(0) += p.middleCols<3>(9) * m.transpose();
     CHECK((columns - expected).norm() < 1e-14);
 
-    mirror(p, size);
+    tensegrity::mirror(p, size);
     CHECK((p - p.transpose()).norm() == 0);
     for (const int count : {0, 1, 3, 4, 9, 12}) {
       Matrix<double, 28, 12> w = Matrix<double, 28, 12>::Random();
       w.bottomRows(28 - size).setZero();
       P reduced = p;
-      subtract_outer(reduced, w, count, size);
+      tensegrity::subtract_outer(reduced, w, count, size);
       const Eigen::MatrixXd used = w.leftCols(count);
       CHECK((reduced - (p - used * used.transpose())).norm() < 1e-13);
       CHECK((reduced - reduced.transpose()).norm() == 0);
