@@ -16,6 +16,7 @@ void bind_shape(py::module_& m);
 void bind_inekf(py::module_& m);
 void bind_contact(py::module_& m);
 void bind_estimator(py::module_& m);
+void bind_dynamics(py::module_& m);
 void bind_ranging_calibration(py::module_& m);
 void bind_ahrs(py::module_& m);
 void bind_ranging(py::module_& m);

@@ -9,6 +9,7 @@ PYBIND11_MODULE(_core, m) {
   bind_inekf(m);
   bind_contact(m);
   bind_estimator(m);
+  bind_dynamics(m);
   bind_ranging_calibration(m);
   bind_ahrs(m);
   bind_ranging(m);

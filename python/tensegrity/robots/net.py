@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
+from tensegrity.errors import InputError
 from tensegrity.robots.robot import Robot
 from tensegrity.yaml_model import StrictModel, field, inconsistent
 
@@ -246,6 +247,27 @@ class Net(StrictModel):
         toward = positions[..., self.partners(), :] - positions
         length = np.linalg.norm(toward, axis=-1, keepdims=True)
         return positions + self.module_inset * toward / length
+
+    def standing_on(self, face: tuple[int, int, int]) -> NDArray[np.float64]:
+        """Positions (n, 3) [m] of the undeformed net with the three nodes of ``face`` (ids) on the
+        ground z = 0, the rest above it, its centre over the origin.
+
+        Raises :class:`InputError` when other nodes are on both sides of the face.
+        """
+        positions = self.undeformed_positions() - self.undeformed_positions().mean(axis=0)
+        a, b, c = (positions[self.index_of(id_)] for id_ in face)
+        up = np.cross(b - a, c - a)
+        if up @ a > 0:
+            up = -up
+        up /= np.linalg.norm(up)
+        ahead = (b - a) / np.linalg.norm(b - a)
+        world = positions @ np.column_stack([ahead, np.cross(up, ahead), up])
+        world[:, 2] -= world[self.index_of(face[0]), 2]
+        if world[:, 2].min() < -1e-9 * self.rod_length:
+            raise InputError(
+                f"{self.name} cannot stand on the nodes {list(face)}", hint="other nodes are lower"
+            )
+        return world
 
     def _indices(self, ends: tuple[tuple[int, int], ...]) -> NDArray[np.int32]:
         index = {id_: i for i, id_ in enumerate(self.node_ids)}
