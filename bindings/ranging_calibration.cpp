@@ -179,7 +179,16 @@ void bind_ranging_calibration(py::module_& m) {
             solver.residuals(out);
             return py::array_t<double>(static_cast<py::ssize_t>(out.size()), out.data());
           },
-          "Predicted minus measured ranges in standard deviations, (N,).");
+          "Predicted minus measured ranges in standard deviations, (N,).")
+      .def(
+          "weights",
+          [](const Solver& solver, LossKind loss, double scale) {
+            std::vector<double> out(solver.ranges());
+            solver.residuals(out);
+            for (double& value : out) value = Loss{loss, scale}.weight(value * value);
+            return py::array_t<double>(static_cast<py::ssize_t>(out.size()), out.data());
+          },
+          py::arg("loss"), py::arg("scale"), "Weights that the loss gives the ranges, (N,).");
 }
 
 }  // namespace tensegrity::bindings

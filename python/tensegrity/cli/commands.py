@@ -31,6 +31,10 @@ COMMANDS = {
         "Find cable offsets and IMU mounting from slow recordings.",
         "calibrate-robot recordings/slow --out robot.yaml",
     ),
+    "calibrate": Summary(
+        "Find anchors and range offsets from a recording of the moving robot.",
+        "calibrate recordings/outdoor --anchors recordings/outdoor/anchors.csv --out calibration",
+    ),
     "config": Summary("Print a filter configuration.", "config paper > my.yaml"),
     "version": Summary("Print the version.", "version"),
 }

@@ -138,11 +138,11 @@ class Strips:
         place = {node: (s, m) for s, strip in enumerate(modules) for m, node in enumerate(strip)}
         strip, module = np.array([place[node] for node in recording.node.tolist()]).T
         if recording.timed:
-            seconds = (recording.t_ns - recording.t_ns[0]) * 1e-9
+            seconds = recording.elapsed
             count = max(int(np.ceil(seconds[-1] / model.knot_s)) + 1, 2)
             knot = np.minimum((seconds / model.knot_s).astype(np.int64), count - 2)
             blend = seconds / model.knot_s - knot
-            knot_t = np.arange(count) * model.knot_s
+            knot_t = np.arange(count, dtype=np.float64) * model.knot_s
         else:
             steps, knot = np.unique(recording.t_ns, return_inverse=True)
             blend = np.zeros(len(recording))
@@ -164,14 +164,11 @@ def build_solver(
     anchor = np.searchsorted(anchors.ids, recording.anchor)
     rods = [len(modules) == 2 for modules in strips.modules]
     rod_of = np.where(rods, np.cumsum(rods) - 1, -1)
-    survey = anchors.position_m.ravel()
-    known = np.isfinite(survey)
-    mean = np.concatenate(
-        [np.where(known, survey, 0.0), terms.prior_mean, np.full(sum(rods), model.rod_length)]
-    )
+    survey = np.nan_to_num(anchors.position_m.ravel())
+    mean = np.concatenate([survey, terms.prior_mean, np.full(sum(rods), model.rod_length)])
     information = np.concatenate(
         [
-            known / model.survey_std**2,
+            survey_information(anchors, model),
             1 / terms.prior_std**2,
             np.full(sum(rods), 1 / model.rod_length_std**2),
         ]
@@ -196,6 +193,11 @@ def build_solver(
         range_std=model.range_std,
         rod_std=model.rod_std,
     )
+
+
+def survey_information(anchors: Anchors, model: Model) -> FloatArray:
+    """What the survey tells about the coordinates (3 A,) of the anchors [1/m^2]."""
+    return anchors.known.ravel() / model.survey_std**2
 
 
 def positions_of(solver: RangeCalibrationSolver, strips: Strips) -> dict[int, FloatArray]:
@@ -238,7 +240,7 @@ def snapshots(
     """
     nodes = recording.nodes
     if recording.timed:
-        seconds = (recording.t_ns - recording.t_ns[0]) * 1e-9
+        seconds = recording.elapsed
         grid = np.arange(0.0, seconds[-1] + interval_s / 2, interval_s)
     else:
         steps, step = np.unique(recording.t_ns, return_inverse=True)

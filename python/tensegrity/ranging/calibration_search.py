@@ -67,7 +67,7 @@ def search(
     """
     coarse = replace(model, offsets="constant", knot_s=_KNOT_S, diffusion=_DIFFUSION)
     unknown = Anchors(recording.anchors, np.full((len(recording.anchors), 3), np.nan))
-    node, time, ranges = snapshots(recording, recording.anchors, _SNAPSHOT_S, _GAP_S)
+    node, time, ranges = snapshots(recording, recording.anchors.tolist(), _SNAPSHOT_S, _GAP_S)
     terms = OffsetTerms.of(coarse, recording.nodes, unknown.ids)
     strips = Strips.of(recording, coarse)
     first, second = (

@@ -163,8 +163,11 @@ def _robust_least_squares(design: FloatArray, target: FloatArray) -> tuple[Float
     """Solution and residuals for Cauchy's loss by reweighting, its scale the residuals' own."""
     weight = np.ones(len(target))
     for _ in range(_ROBUST_ROUNDS):
-        solution = np.linalg.lstsq(design * weight[:, None], target * weight, rcond=1e-10)[0]
-        residual = target - design @ solution
+        solution = np.asarray(
+            np.linalg.lstsq(design * weight[:, None], target * weight, rcond=1e-10)[0],
+            dtype=np.float64,
+        )
+        residual = np.asarray(target - design @ solution, dtype=np.float64)
         turn = max(_LEAST_TURN_M, 1.5 * float(np.median(np.abs(residual))))
         weight = 1 / np.sqrt(1 + (residual / turn) ** 2)
     return solution, residual

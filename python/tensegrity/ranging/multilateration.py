@@ -35,7 +35,7 @@ class Whereabouts:
     @property
     def information(self) -> FloatArray:
         """Inverse of the covariance [1/m^2]."""
-        return np.linalg.inv(self.covariance)
+        return np.asarray(np.linalg.inv(self.covariance), dtype=np.float64)
 
     @classmethod
     def unknown(cls) -> Whereabouts:

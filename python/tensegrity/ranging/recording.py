@@ -94,6 +94,13 @@ class RangeRecording:
         return len(self.t_ns)
 
     @property
+    def elapsed(self) -> FloatArray:
+        """Seconds (N,) from the first range when ``timed``, else steps."""
+        if self.timed:
+            return (self.t_ns - self.t_ns[0]) * 1e-9
+        return self.t_ns.astype(np.float64)
+
+    @property
     def nodes(self) -> IntArray:
         """Modules of the robot that were ranged, ascending."""
         return np.unique(self.node)
