@@ -77,6 +77,7 @@ void bind_ahrs(py::module_& m) {
            "Updates with every row of gyro (N, 3), accel (N, 3) and dt (N,); returns the "
            "orientations after each (N, 4) and the statuses (N,) as numbers of Status.")
       .def_property_readonly("started", &Filter::started)
+      .def_property_readonly("settings", &Filter::settings)
       .def_property_readonly(
           "orientation",
           [](const Filter& filter) {

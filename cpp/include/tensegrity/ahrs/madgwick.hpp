@@ -44,9 +44,8 @@ class Madgwick {
   // Begins with the least rotation that explains a specific force measured at rest [m/s^2].
   // kOutOfRange when it has no direction or is too large.
   Status start(const V3& force) {
-    const Status status = check(force, settings_.largest_force);
-    if (status != Status::kOk) return status;
-    if (!(force.norm() > 0)) return Status::kOutOfRange;
+    if (!force.allFinite()) return Status::kNotFinite;
+    if (!(force.norm() > 0 && force.norm() <= settings_.largest_force)) return Status::kOutOfRange;
     orientation_ = Quaternion::FromTwoVectors(force, V3::UnitZ());
     started_ = true;
     return Status::kOk;
@@ -89,6 +88,7 @@ class Madgwick {
   }
 
   bool started() const { return started_; }
+  const MadgwickSettings<Scalar>& settings() const { return settings_; }
 
   // From the IMU's frame to the world; identity before start().
   const Quaternion& orientation() const { return orientation_; }
@@ -100,18 +100,12 @@ class Madgwick {
  private:
   using V4 = Eigen::Matrix<Scalar, 4, 1>;  // w, x, y, z
 
-  static Status check(const V3& value, Scalar largest) {
-    if (!value.allFinite()) return Status::kNotFinite;
-    return value.norm() <= largest ? Status::kOk : Status::kOutOfRange;
-  }
-
   Status check(const V3& rate, const V3& force, Scalar dt) const {
-    if (!std::isfinite(dt)) return Status::kNotFinite;
-    for (const Status status :
-         {check(rate, settings_.largest_rate), check(force, settings_.largest_force)}) {
-      if (status != Status::kOk) return status;
-    }
-    if (!(dt > 0 && dt <= settings_.largest_interval)) return Status::kOutOfRange;
+    if (!std::isfinite(dt) || !rate.allFinite() || !force.allFinite()) return Status::kNotFinite;
+    const bool possible = rate.norm() <= settings_.largest_rate &&
+                          force.norm() <= settings_.largest_force && dt > 0 &&
+                          dt <= settings_.largest_interval;
+    if (!possible) return Status::kOutOfRange;
     return started_ ? Status::kOk : Status::kNotInitialized;
   }
 
