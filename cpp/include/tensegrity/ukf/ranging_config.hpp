@@ -36,6 +36,11 @@ enum class ProcessNoise : std::uint8_t {
 template <typename Scalar>
 struct RangingConfig {
   UnscentedSettings<Scalar> filter;
+  // Standard deviations that sigma points lie from the mean, in place of filter.alpha; 0: alpha as
+  // it is. A net has kinks: cables go slack, nodes touch the ground. The second differences that
+  // points a tenth of a standard deviation away take of them (alpha = 0.0139) are multiplied by
+  // 1 / alpha^2 and blow the filter up; sqrt(3) is exact for Gaussian fourth moments.
+  Scalar spread = Scalar(1.7320508);
   Scalar period = Scalar(0.1);           // between updates [s]
   Scalar dynamics_step = Scalar(0.005);  // longest step of the dynamics [s]
   Scalar max_latency = Scalar(0.02);     // an update waits so long for late measurements [s]
@@ -71,6 +76,7 @@ RangingConfig<Scalar> paper_config() {
   RangingConfig<Scalar> config;
   config.filter.weights = Weights::kUniform;
   config.filter.redraw = false;
+  config.spread = Scalar(0);
   config.range_std = config.internal_range_std = Scalar(0.029);
   config.inclination_std = Scalar(0.1);
   config.process_noise = ProcessNoise::kState;

@@ -54,7 +54,7 @@ class RangingEstimator {
         dynamics_(std::move(dynamics)),
         nodes_(int(robot.nodes.size())),
         model_(robot, anchors, 12 * nodes_ + 1),
-        filter_(6 * nodes_, kRows, config.filter),
+        filter_(6 * nodes_, kRows, filter_settings(config, 6 * nodes_)),
         search_(robot.nodes, modules(robot), axes(robot),
                 {PoseSearchSettings<Scalar>().orientations, PoseSearchSettings<Scalar>().iterations,
                  config.start_ground_std}),
@@ -222,6 +222,16 @@ class RangingEstimator {
     return std::size_t(node) * model_.anchors().positions.size() + std::size_t(anchor);
   }
 
+  static UnscentedSettings<Scalar> filter_settings(const RangingConfig<Scalar>& config,
+                                                   int dimension) {
+    UnscentedSettings<Scalar> settings = config.filter;
+    if (config.spread > 0) {
+      settings.alpha = config.spread / std::sqrt(Scalar(dimension));
+      settings.kappa = 0;
+    }
+    return settings;
+  }
+
   // ---- input
 
   Status drop(Status status) {
@@ -252,6 +262,7 @@ class RangingEstimator {
       pending_.clear();
       recent_.clear();
     }
+    if (recent_.empty()) first_range_ = row.t;
     run_updates(row.t);
     push(row);
     if (row.kind == Row::Kind::kRange) remember(row);
@@ -306,6 +317,10 @@ class RangingEstimator {
     correct();
     ++state_.health.updates;
     describe();
+    if (ran_away()) {
+      start_anew(t);
+      return;
+    }
     if (config_.lost_level > 0 && state_.surprise > config_.lost_level &&
         seconds(last_start_, t) > config_.lost_time) {
       restart(t);
@@ -324,6 +339,7 @@ class RangingEstimator {
     }
     const int steps = std::max(1, int(std::ceil(double(dt / config_.dynamics_step) - 1e-6)));
     const auto process = [&](MatrixRef<Scalar> points) {
+      if (config_.hold_rods) hold_rods_of(points);
       return dynamics_.step(points, rest_lengths_, dt / Scalar(steps), steps) == Status::kOk;
     };
     if (filter_.predict(process, noise_) != Status::kOk) ++state_.health.failed_predictions;
@@ -430,15 +446,70 @@ class RangingEstimator {
     filter_.move(x);
   }
 
+  // The same for sigma points: displacements across a rod stretch it to second order. Every rod
+  // gets the length and the speed of stretching that it has in the mean.
+  void hold_rods_of(MatrixRef<Scalar> points) const {
+    const int v = 3 * nodes_;
+    const Eigen::Index count = points.rows();
+    for (const auto& rod : model_.robot().rods) {
+      const int a = 3 * rod[0], b = 3 * rod[1];
+      const V3 mean = filter_.mean().template segment<3>(b) - filter_.mean().template segment<3>(a);
+      const Scalar length = mean.norm();
+      const Scalar speed =
+          (filter_.mean().template segment<3>(v + b) - filter_.mean().template segment<3>(v + a))
+              .dot(mean) /
+          length;
+      Scalar* x[2][3];
+      Scalar* w[2][3];
+      for (int k = 0; k < 3; ++k) {
+        x[0][k] = &points(0, a + k);
+        x[1][k] = &points(0, b + k);
+        w[0][k] = &points(0, v + a + k);
+        w[1][k] = &points(0, v + b + k);
+      }
+      for (Eigen::Index s = 0; s < count; ++s) {
+        const Scalar dx = x[1][0][s] - x[0][0][s], dy = x[1][1][s] - x[0][1][s],
+                     dz = x[1][2][s] - x[0][2][s];
+        const Scalar inverse = 1 / std::sqrt(dx * dx + dy * dy + dz * dz);
+        const Scalar ux = dx * inverse, uy = dy * inverse, uz = dz * inverse;
+        const Scalar stretching = (w[1][0][s] - w[0][0][s]) * ux + (w[1][1][s] - w[0][1][s]) * uy +
+                                  (w[1][2][s] - w[0][2][s]) * uz;
+        const Scalar longer = (length - 1 / inverse) / 2, faster = (speed - stretching) / 2;
+        const Scalar u[3] = {ux, uy, uz};
+        for (int k = 0; k < 3; ++k) {
+          x[0][k][s] -= longer * u[k];
+          x[1][k][s] += longer * u[k];
+          w[0][k][s] -= faster * u[k];
+          w[1][k][s] += faster * u[k];
+        }
+      }
+    }
+  }
+
   // ---- start
 
   void try_start(Nanoseconds t) {
     if (state_.initialized || recent_.empty()) return;
-    if (seconds(recent_.front().t, t) < config_.start_window - Scalar(1e-6)) return;
+    if (seconds(first_range_, t) < config_.start_window - Scalar(1e-6)) return;
     if (gather(t) < config_.start_pairs) return;
     const RigidPose<Scalar> pose = search_.best(distances_, inclinations_);
     if (!std::isfinite(pose.cost)) return;
     begin(t, pose);
+  }
+
+  // No rolling robot is this fast or this uncertain: sigma points so far apart that their cables
+  // tear the net away from where it is.
+  bool ran_away() const {
+    return state_.velocities.cwiseAbs().maxCoeff() > kFastest ||
+           state_.position_std.maxCoeff() > kMostUncertain;
+  }
+
+  // Starts from the latest ranges, or waits for more.
+  void start_anew(Nanoseconds t) {
+    ++state_.health.restarts;
+    state_.initialized = false;
+    pending_.clear();
+    if (!recent_.empty()) try_start(t);
   }
 
   // Searches a pose for the latest ranges, and takes it if it explains them clearly better.
@@ -548,6 +619,8 @@ class RangingEstimator {
   }
   Scalar height(int node) const { return state_.positions[3 * node + 2]; }
 
+  static constexpr Scalar kFastest = Scalar(50);        // [m/s]
+  static constexpr Scalar kMostUncertain = Scalar(20);  // [m]
   static constexpr Scalar kWildest = Scalar(16);
   static constexpr Scalar kClearlyBetter = Scalar(0.7);
 
@@ -568,7 +641,8 @@ class RangingEstimator {
   std::vector<int> pair_count_;
   Nanoseconds newest_motors_ = kNever, newest_any_range_ = kNever;
   Nanoseconds now_ = kNever, next_ = 0, last_start_ = 0;
-  int imu_rows_ = 0;  // the first row that an IMU of ours gave
+  Nanoseconds first_range_ = 0;  // since when ranges have come without a gap
+  int imu_rows_ = 0;             // the first row that an IMU of ours gave
   RangingState<Scalar> state_;
 };
 
