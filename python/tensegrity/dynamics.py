@@ -152,7 +152,7 @@ def relax(
 ) -> FloatArray:
     """Positions (n, 3) [m] where the net comes to rest, no node pulled by ``force_tolerance`` [N].
 
-    It starts at ``start`` (n, 3), by default as described; with ``gravity`` it stands on the ground.
+    It starts at ``start`` (n, 3), by default as described; with ``gravity``, on the ground.
     Whenever its kinetic energy has passed a peak it is stopped ("kinetic damping"), which ends in
     an equilibrium in much fewer steps than its own damping would.
 
