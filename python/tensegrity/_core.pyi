@@ -7,7 +7,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['Chirality', 'ConstraintSet', 'ContactDetector', 'ContactDetectorParameters', 'ContactNoise', 'ContactPoint', 'ImuSampling', 'InvariantFilter', 'IpoptShapeSolver', 'PRISM_CABLES', 'Prism', 'PrismConfig', 'PrismEstimator', 'PrismHealth', 'PrismState', 'ShapeMethod', 'ShapeSolver', 'ShapeTracker', 'SpinMethod', 'Status', 'Terrain', 'cable_lengths', 'endcap_jacobian', 'fold', 'in_body_frame', 'inequality_values', 'length_jacobian', 'mutual_moments', 'spin_angle']
+__all__: list[str] = ['CalibrationStatus', 'Chirality', 'ConstraintSet', 'ContactDetector', 'ContactDetectorParameters', 'ContactNoise', 'ContactPoint', 'DWM1000_TICK_S', 'FilterForm', 'ImuSampling', 'Integrator', 'InvariantFilter', 'IpoptShapeSolver', 'Madgwick', 'MadgwickSettings', 'Net', 'NetGround', 'NetSimulator', 'NetSimulatorFloat', 'PRISM_CABLES', 'Prism', 'PrismConfig', 'PrismEstimator', 'PrismHealth', 'PrismState', 'RangeCalibrationSolver', 'RangeLoss', 'RangingAnchors', 'RangingArrays', 'RangingConfig', 'RangingEstimator', 'RangingHealth', 'RangingProcessNoise', 'RangingRobot', 'RangingState', 'SPEED_OF_LIGHT', 'ShapeMethod', 'ShapeSolver', 'ShapeTracker', 'SigmaWeights', 'SpinMethod', 'Status', 'Terrain', 'UnscentedFilter', 'UnscentedSettings', 'cable_lengths', 'endcap_jacobian', 'fold', 'in_body_frame', 'inequality_values', 'length_jacobian', 'mutual_moments', 'spin_angle', 'two_way_ranges']
 class Status(enum.Enum):
     """
     What a call did with its input.
@@ -795,6 +795,779 @@ class PrismEstimator:
     @property
     def state(self) -> PrismState:
         ...
+class Integrator(enum.Enum):
+    """
+    Of the equations of motion.
+    """
+    RUNGE_KUTTA_4 = ...
+    SEMI_IMPLICIT_EULER = ...
+class NetGround:
+    """
+    The plane z = 0 that a net rests on.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def damping(self) -> float:
+        """
+        [N s/m^2]
+        """
+    @damping.setter
+    def damping(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def friction_damping(self) -> float:
+        """
+        [N s/m]
+        """
+    @friction_damping.setter
+    def friction_damping(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def friction_kinetic(self) -> float:
+        ...
+    @friction_kinetic.setter
+    def friction_kinetic(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def friction_static(self) -> float:
+        ...
+    @friction_static.setter
+    def friction_static(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def friction_stiffness(self) -> float:
+        """
+        [N/m]
+        """
+    @friction_stiffness.setter
+    def friction_stiffness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def stiffness(self) -> float:
+        """
+        [N/m]; 0 with damping 0: no ground
+        """
+    @stiffness.setter
+    def stiffness(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class Net:
+    """
+    Point masses joined by rods and cables.
+    """
+    def __init__(self, nodes: typing.SupportsInt | typing.SupportsIndex, node_mass: typing.SupportsFloat | typing.SupportsIndex, ground: NetGround, gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        ...
+    def set_cables(self, ends: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 2]"], stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], damping: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], rest_length: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        """
+        ends (cables, 2), as set_rods
+        """
+    def set_rods(self, ends: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 2]"], stiffness: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], damping: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], rest_length: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        """
+        ends (rods, 2): indices of nodes; stiffness [N/m], damping [N s/m], rest_length [m]
+        """
+class NetSimulator:
+    """
+    Many simulations of one net at once.
+    """
+    def __init__(self, net: Net) -> None:
+        ...
+    @typing.overload
+    def step(self, states: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.writeable", "flags.f_contiguous"], rest_lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], dt: typing.SupportsFloat | typing.SupportsIndex, steps: typing.SupportsInt | typing.SupportsIndex, integrator: Integrator = ...) -> Status:
+        """
+        Moves the states (simulations, 6n), in Fortran order, by steps of dt [s] in place. Friction remembers for this call alone.
+        """
+    @typing.overload
+    def step(self, states: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.writeable", "flags.f_contiguous"], anchors: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]", "flags.writeable", "flags.f_contiguous"], rest_lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], dt: typing.SupportsFloat | typing.SupportsIndex, steps: typing.SupportsInt | typing.SupportsIndex, integrator: Integrator = ...) -> Status:
+        """
+        The same with the points where nodes stand (simulations, 2n), in Fortran order, moved along.
+        """
+    @property
+    def failures(self) -> int:
+        """
+        Simulations that the last step left as they were.
+        """
+class NetSimulatorFloat:
+    """
+    NetSimulator in single precision: twice as many per SIMD register.
+    """
+    def __init__(self, net: Net) -> None:
+        ...
+    @typing.overload
+    def step(self, states: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.writeable", "flags.f_contiguous"], rest_lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float32, "[m, 1]"], dt: typing.SupportsFloat | typing.SupportsIndex, steps: typing.SupportsInt | typing.SupportsIndex, integrator: Integrator = ...) -> Status:
+        """
+        Moves the states (simulations, 6n), in Fortran order, by steps of dt [s] in place. Friction remembers for this call alone.
+        """
+    @typing.overload
+    def step(self, states: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.writeable", "flags.f_contiguous"], anchors: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.writeable", "flags.f_contiguous"], rest_lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float32, "[m, 1]"], dt: typing.SupportsFloat | typing.SupportsIndex, steps: typing.SupportsInt | typing.SupportsIndex, integrator: Integrator = ...) -> Status:
+        """
+        The same with the points where nodes stand (simulations, 2n), in Fortran order, moved along.
+        """
+    @property
+    def failures(self) -> int:
+        """
+        Simulations that the last step left as they were.
+        """
+class RangeLoss(enum.Enum):
+    """
+    Loss of a range's whitened residual.
+    """
+    cauchy = ...
+    huber = ...
+    squares = ...
+class CalibrationStatus(enum.Enum):
+    """
+    How a solution ended.
+    """
+    converged = ...
+    iteration_limit = ...
+    stuck = ...
+class RangeCalibrationSolver:
+    """
+    Levenberg-Marquardt over shared parameters [anchors 3A | offset terms | rod lengths] and the knots of the trajectories, strip by strip.
+    """
+    def __init__(self, *, anchors: typing.SupportsInt | typing.SupportsIndex, offset_terms: typing.SupportsInt | typing.SupportsIndex, rod_lengths: typing.SupportsInt | typing.SupportsIndex, prior_mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], prior_information: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], strip_modules: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], strip_knots: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], strip_rod: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], motion_information: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], indices: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], blend: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], range_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], range_std: typing.SupportsFloat | typing.SupportsIndex, rod_std: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def cost(self, loss: RangeLoss, scale: typing.SupportsFloat | typing.SupportsIndex) -> float:
+        """
+        Half the sum of losses and squared priors.
+        """
+    def positions(self, strip: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Positions of a strip, flat: (knots, modules, 3) [m].
+        """
+    def reduced_information(self, loss: RangeLoss, scale: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Information of the shared parameters, trajectory marginalised [1/m^2].
+        """
+    def residuals(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Predicted minus measured ranges in standard deviations, (N,).
+        """
+    def set_positions(self, strip: typing.SupportsInt | typing.SupportsIndex, positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        ...
+    def solve(self, loss: RangeLoss, scale: typing.SupportsFloat | typing.SupportsIndex, max_iterations: typing.SupportsInt | typing.SupportsIndex, tolerance: typing.SupportsFloat | typing.SupportsIndex) -> tuple[CalibrationStatus, int, float]:
+        """
+        Minimises from the current state; returns status, iterations and the cost.
+        """
+    def weights(self, loss: RangeLoss, scale: typing.SupportsFloat | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Weights that the loss gives the ranges, (N,).
+        """
+    @property
+    def shared(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        Shared parameters [m].
+        """
+    @shared.setter
+    def shared(self, arg1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        ...
+class MadgwickSettings:
+    """
+    Settings of the gradient-descent filter.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def gain(self) -> float:
+        """
+        step down the gradient [1/s]
+        """
+    @gain.setter
+    def gain(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def largest_force(self) -> float:
+        """
+        of a measurement [m/s^2]
+        """
+    @largest_force.setter
+    def largest_force(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def largest_interval(self) -> float:
+        """
+        of one sample [s]
+        """
+    @largest_interval.setter
+    def largest_interval(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def largest_rate(self) -> float:
+        """
+        of a measurement [rad/s]
+        """
+    @largest_rate.setter
+    def largest_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class Madgwick:
+    """
+    Orientation of an IMU by gradient descent (Madgwick et al. 2011). Quaternions are w, x, y, z, from the IMU's frame to the world, z up.
+    """
+    def __init__(self, settings: MadgwickSettings = ...) -> None:
+        ...
+    def inclination_cosine(self, axis: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = (0, 0, 1)) -> float:
+        """
+        Cosine of the angle between the vertical (up) and an axis (3,) of the IMU's frame.
+        """
+    def run(self, gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], dt: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        Updates with every row of gyro (N, 3), accel (N, 3) and dt (N,); returns the orientations after each (N, 4) and the statuses (N,) as numbers of Status.
+        """
+    def start(self, accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> Status:
+        """
+        Begins level with a specific force (3,) measured at rest [m/s^2].
+        """
+    def start_at(self, orientation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"]) -> Status:
+        """
+        Begins with a known orientation (4,).
+        """
+    @typing.overload
+    def update(self, gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], dt: typing.SupportsFloat | typing.SupportsIndex) -> Status:
+        """
+        One sample: rate (3,) [rad/s] and specific force (3,) [m/s^2] over dt [s].
+        """
+    @typing.overload
+    def update(self, gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], field: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], dt: typing.SupportsFloat | typing.SupportsIndex) -> Status:
+        """
+        As above with the magnetic field (3,) in any unit.
+        """
+    @property
+    def orientation(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 1]"]:
+        """
+        Quaternion (4,); identity before the start.
+        """
+    @property
+    def settings(self) -> MadgwickSettings:
+        ...
+    @property
+    def started(self) -> bool:
+        ...
+class SigmaWeights(enum.Enum):
+    """
+    How sigma points count.
+    """
+    SCALED = ...
+    UNIFORM = ...
+class FilterForm(enum.Enum):
+    """
+    What an unscented filter keeps.
+    """
+    COVARIANCE = ...
+    SQUARE_ROOT = ...
+class UnscentedSettings:
+    """
+    Sigma points and form of an unscented filter.
+    """
+    form: FilterForm
+    weights: SigmaWeights
+    def __init__(self) -> None:
+        ...
+    @property
+    def alpha(self) -> float:
+        """
+        spread of the points
+        """
+    @alpha.setter
+    def alpha(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def beta(self) -> float:
+        """
+        2 for Gaussian states
+        """
+    @beta.setter
+    def beta(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def kappa(self) -> float:
+        ...
+    @kappa.setter
+    def kappa(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def redraw(self) -> bool:
+        """
+        draw new points from the predicted covariance before a correction
+        """
+    @redraw.setter
+    def redraw(self, arg0: bool) -> None:
+        ...
+class UnscentedFilter:
+    """
+    Unscented Kalman filter with additive noise, measurements that come and go.
+    """
+    def __init__(self, dimension: typing.SupportsInt | typing.SupportsIndex, capacity: typing.SupportsInt | typing.SupportsIndex, settings: UnscentedSettings = ...) -> None:
+        ...
+    def correct(self, measure: collections.abc.Callable, z: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], variances: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], gate: typing.SupportsFloat | typing.SupportsIndex = ...) -> Status:
+        """
+        `measure` maps sigma points (2L+1, L) to measurements (2L+1, rows); z and variances are (rows,); rows with a squared innovation above `gate` variances are left out.
+        """
+    def predict(self, process: collections.abc.Callable, noise: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> Status:
+        """
+        `process` maps sigma points (2L+1, L) to new ones; `noise` (L, L) is added.
+        """
+    def set(self, mean: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> Status:
+        """
+        Starts from a mean (L,) and covariance (L, L).
+        """
+    @property
+    def accepted(self) -> list[bool]:
+        """
+        Of the rows of the last correction.
+        """
+    @property
+    def capacity(self) -> int:
+        ...
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        ...
+    @property
+    def dimension(self) -> int:
+        ...
+    @property
+    def mean(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        ...
+    @property
+    def squared_distance(self) -> float:
+        """
+        Chi-square of the rows used last.
+        """
+class RangingProcessNoise(enum.Enum):
+    """
+    What disturbs the net between updates.
+    """
+    ACCELERATION = ...
+    STATE = ...
+class RangingRobot:
+    """
+    Nodes (n, 3) of the undeformed robot [m], rods (r, 2).
+    """
+    def __init__(self, nodes: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], rods: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 2]"], rod_length: typing.SupportsFloat | typing.SupportsIndex, module_inset: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class RangingAnchors:
+    """
+    Positions (A, 3) of the anchors [m]; offsets and how well they are known, (n, A); offsets among the robot's modules, (n, n) [m].
+    """
+    def __init__(self, positions: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"], offsets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], offset_std: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"], internal_offsets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> None:
+        ...
+class RangingConfig:
+    """
+    Settings of RangingEstimator; noises are standard deviations.
+    """
+    process_noise: RangingProcessNoise
+    @staticmethod
+    def paper() -> RangingConfig:
+        """
+        The filter as published, with the sigma weights of its authors' code.
+        """
+    def __init__(self) -> None:
+        ...
+    @property
+    def body_acceleration(self) -> float:
+        """
+        ACCELERATION: of the robot as one body [m/s/sqrt(s)]
+        """
+    @body_acceleration.setter
+    def body_acceleration(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def dynamics_step(self) -> float:
+        """
+        longest step [s]
+        """
+    @dynamics_step.setter
+    def dynamics_step(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def filter(self) -> UnscentedSettings:
+        """
+        sigma points and form
+        """
+    @filter.setter
+    def filter(self, arg0: UnscentedSettings) -> None:
+        ...
+    @property
+    def gate(self) -> float:
+        """
+        largest innovation [standard deviations]; 0: none
+        """
+    @gate.setter
+    def gate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def hold_rods(self) -> bool:
+        """
+        sigma points and corrections never stretch rods
+        """
+    @hold_rods.setter
+    def hold_rods(self, arg0: bool) -> None:
+        ...
+    @property
+    def inclination_std(self) -> float:
+        """
+        [rad]
+        """
+    @inclination_std.setter
+    def inclination_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def internal_range_std(self) -> float:
+        """
+        [m]
+        """
+    @internal_range_std.setter
+    def internal_range_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def lost_level(self) -> float:
+        """
+        mean squared innovation in variances; 0: never lost
+        """
+    @lost_level.setter
+    def lost_level(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def lost_time(self) -> float:
+        """
+        [s]
+        """
+    @lost_time.setter
+    def lost_time(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_latency(self) -> float:
+        """
+        an update waits so long [s]
+        """
+    @max_latency.setter
+    def max_latency(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def node_acceleration(self) -> float:
+        """
+        ACCELERATION: of every node [m/s/sqrt(s)]
+        """
+    @node_acceleration.setter
+    def node_acceleration(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def period(self) -> float:
+        """
+        between updates [s]
+        """
+    @period.setter
+    def period(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def range_std(self) -> float:
+        """
+        to an anchor [m]
+        """
+    @range_std.setter
+    def range_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def spread(self) -> float:
+        """
+        standard deviations of the sigma points from the mean, in place of filter.alpha; 0: alpha as it is
+        """
+    @spread.setter
+    def spread(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def start_body_std(self) -> float:
+        """
+        [m]
+        """
+    @start_body_std.setter
+    def start_body_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def start_ground_std(self) -> float:
+        """
+        height of the three lowest nodes [m]; 0: no ground
+        """
+    @start_ground_std.setter
+    def start_ground_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def start_node_std(self) -> float:
+        """
+        [m]
+        """
+    @start_node_std.setter
+    def start_node_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def start_pairs(self) -> int:
+        """
+        pairs of modules that a start needs
+        """
+    @start_pairs.setter
+    def start_pairs(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def start_speed_std(self) -> float:
+        """
+        [m/s]
+        """
+    @start_speed_std.setter
+    def start_speed_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def start_window(self) -> float:
+        """
+        [s]
+        """
+    @start_window.setter
+    def start_window(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def state_std(self) -> float:
+        """
+        STATE: per update [m], [m/s]
+        """
+    @state_std.setter
+    def state_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class RangingHealth:
+    """
+    Counters of RangingEstimator.
+    """
+    @property
+    def dropped(self) -> int:
+        """
+        wrong stamp, index or value
+        """
+    @property
+    def failed_predictions(self) -> int:
+        ...
+    @property
+    def gaps(self) -> int:
+        """
+        times without ranges
+        """
+    @property
+    def inclinations_rejected(self) -> int:
+        """
+        by the gate
+        """
+    @property
+    def inclinations_used(self) -> int:
+        ...
+    @property
+    def ranges_rejected(self) -> int:
+        """
+        by the gate
+        """
+    @property
+    def ranges_used(self) -> int:
+        ...
+    @property
+    def restarts(self) -> int:
+        """
+        of a filter that was lost
+        """
+    @property
+    def updates(self) -> int:
+        ...
+class RangingState:
+    """
+    What RangingEstimator knows after its last update.
+    """
+    @property
+    def centre_of_mass(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        world [m]
+        """
+    @property
+    def centre_of_mass_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        [m^2]
+        """
+    @property
+    def centre_of_mass_velocity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        [m/s]
+        """
+    @property
+    def face(self) -> typing.Annotated[list[int], "FixedSize(3)"]:
+        """
+        indices of the three lowest nodes, lowest first
+        """
+    @property
+    def health(self) -> RangingHealth:
+        ...
+    @property
+    def initialized(self) -> bool:
+        ...
+    @property
+    def position_std(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        (n, 3) [m]
+        """
+    @property
+    def positions(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        Ends of the rods (n, 3), world [m].
+        """
+    @property
+    def surprise(self) -> float:
+        """
+        mean squared innovation in variances, recently; 1 is right
+        """
+    @property
+    def t(self) -> int:
+        """
+        [ns]
+        """
+    @property
+    def velocities(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        (n, 3) [m/s]
+        """
+class RangingArrays:
+    """
+    Recorded arrays, sorted by stamp.
+    """
+    def __init__(self) -> None:
+        ...
+    @property
+    def accel(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        (S, 3) [m/s^2]
+        """
+    @accel.setter
+    def accel(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None:
+        ...
+    @property
+    def gyro(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]:
+        """
+        (S, 3) [rad/s]
+        """
+    @gyro.setter
+    def gyro(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 3]"]) -> None:
+        ...
+    @property
+    def imu_nodes(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]:
+        """
+        (S,) indices of nodes
+        """
+    @imu_nodes.setter
+    def imu_nodes(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 1]"]) -> None:
+        ...
+    @property
+    def imu_t(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int64], "[m, 1]"]:
+        """
+        (S,) [ns]
+        """
+    @imu_t.setter
+    def imu_t(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.int64, "[m, 1]"]) -> None:
+        ...
+    @property
+    def internal_pairs(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 2]"]:
+        """
+        (I, 2) indices of nodes
+        """
+    @internal_pairs.setter
+    def internal_pairs(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 2]"]) -> None:
+        ...
+    @property
+    def internal_ranges(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (I,) raw [m]
+        """
+    @internal_ranges.setter
+    def internal_ranges(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        ...
+    @property
+    def internal_t(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int64], "[m, 1]"]:
+        """
+        (I,) [ns]
+        """
+    @internal_t.setter
+    def internal_t(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.int64, "[m, 1]"]) -> None:
+        ...
+    @property
+    def motor_t(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int64], "[m, 1]"]:
+        """
+        (M,) [ns]
+        """
+    @motor_t.setter
+    def motor_t(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.int64, "[m, 1]"]) -> None:
+        ...
+    @property
+    def range_pairs(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 2]"]:
+        """
+        (N, 2) indices of node and anchor
+        """
+    @range_pairs.setter
+    def range_pairs(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.int32, "[m, 2]"]) -> None:
+        ...
+    @property
+    def range_t(self) -> typing.Annotated[numpy.typing.NDArray[numpy.int64], "[m, 1]"]:
+        """
+        (N,) [ns]
+        """
+    @range_t.setter
+    def range_t(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.int64, "[m, 1]"]) -> None:
+        ...
+    @property
+    def ranges(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
+        """
+        (N,) raw [m]
+        """
+    @ranges.setter
+    def ranges(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> None:
+        ...
+    @property
+    def rest_lengths(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, n]"]:
+        """
+        (M, cables) [m]
+        """
+    @rest_lengths.setter
+    def rest_lengths(self, arg0: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, n]"]) -> None:
+        ...
+class RangingEstimator:
+    """
+    Ranges, inclinations and motors in, state of a net of rods out (C §IV). Modules go by their indices.
+    """
+    def __init__(self, robot: RangingRobot, anchors: RangingAnchors, net: Net, rest_lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"], config: RangingConfig = ...) -> None:
+        ...
+    def imu(self, t: typing.SupportsInt | typing.SupportsIndex, node: typing.SupportsInt | typing.SupportsIndex, gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> Status:
+        """
+        A sample [rad/s], [m/s^2], z along the rod toward its first end.
+        """
+    def inclination(self, t: typing.SupportsInt | typing.SupportsIndex, rod: typing.SupportsInt | typing.SupportsIndex, cosine: typing.SupportsFloat | typing.SupportsIndex) -> Status:
+        """
+        Cosine of the angle between up and a rod, toward its first end.
+        """
+    def internal_range(self, t: typing.SupportsInt | typing.SupportsIndex, node: typing.SupportsInt | typing.SupportsIndex, other: typing.SupportsInt | typing.SupportsIndex, range: typing.SupportsFloat | typing.SupportsIndex) -> Status:
+        """
+        A raw range between two modules [m].
+        """
+    def motors(self, t: typing.SupportsInt | typing.SupportsIndex, rest_lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[m, 1]"]) -> Status:
+        """
+        Rest lengths of all cables [m].
+        """
+    def range(self, t: typing.SupportsInt | typing.SupportsIndex, node: typing.SupportsInt | typing.SupportsIndex, anchor: typing.SupportsInt | typing.SupportsIndex, range: typing.SupportsFloat | typing.SupportsIndex) -> Status:
+        """
+        A raw range [m].
+        """
+    def run(self, arrays: RangingArrays) -> dict:
+        """
+        Feeds recorded arrays; returns the states after every update as arrays.
+        """
+    def update(self, t: typing.SupportsInt | typing.SupportsIndex) -> Status:
+        """
+        Brings the state to t.
+        """
+    @property
+    def initialized(self) -> bool:
+        ...
+    @property
+    def state(self) -> RangingState:
+        ...
 def cable_lengths(endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 1]"]:
     """
     Distances (9,) of endcaps (6, 3) in the order of PRISM_CABLES [m].
@@ -827,5 +1600,11 @@ def spin_angle(endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, 
     """
     Angle about body z by which `reference` has to be turned to fit `endcaps` best over endcaps 2 to 5 [rad].
     """
+def two_way_ranges(stamps: typing.Annotated[numpy.typing.ArrayLike, numpy.uint64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
+    """
+    Raw ranges (N,) [m], relative drifts (N,) [1] and statuses (N,), as numbers of Status, of exchanges (N, 6): poll sent, received, response sent, received, final sent, received.
+    """
+DWM1000_TICK_S: float = 1.5650040064102565e-11
 PRISM_CABLES: tuple = ((0, 4), (0, 2), (2, 4), (1, 5), (1, 3), (3, 5), (1, 4), (0, 3), (2, 5))
+SPEED_OF_LIGHT: float = 299792458.0
 __version__: str = '0.1.0'
