@@ -10,13 +10,12 @@ import typer
 from rich.table import Column, Table
 
 from tensegrity.cli.console import out, progress_bar
-from tensegrity.cli.output import check_output
 from tensegrity.errors import InputError
+from tensegrity.files import check_directory
 from tensegrity.ranging.calibration import ATTEMPTS, RangeCalibration, Solver, calibrate_ranges
 from tensegrity.ranging.calibration_files import CALIBRATION_FILE, write_calibration
 from tensegrity.ranging.calibration_model import Loss, Model, OffsetModel
 from tensegrity.ranging.recording import read_anchors, read_ranges
-
 
 _DEFAULT = Model()
 
@@ -61,7 +60,7 @@ def calibrate(
     ] = False,
 ) -> None:
     """Find anchors and range offsets from a recording of the moving robot."""
-    check_output(output, marker=CALIBRATION_FILE, overwrite=overwrite)
+    check_directory(output, marker=CALIBRATION_FILE, overwrite=overwrite)
     for name, value in (
         ("loss-scale", loss_scale),
         ("rod-length", rod_length),

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 FloatArray = NDArray[np.float64]
 
-_ITERATIONS = 12
+_ITERATIONS = 6
 _LEVEL_M = 0.05  # a floor tilted by 1 rad counts like an error of the survey of so much
 
 

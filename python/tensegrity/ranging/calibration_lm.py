@@ -25,8 +25,8 @@ from tensegrity.ranging.recording import Anchors, RangeRecording
 
 FloatArray = NDArray[np.float64]
 
-_ITERATIONS = 60
-_TOLERANCE = 1e-5
+_ITERATIONS = 100
+_TOLERANCE = 1e-4
 _SEARCH_SHARE = 0.7  # of the time, for progress
 
 

@@ -40,19 +40,19 @@ class Model:
 
     offsets: OffsetModel = "module"
     loss: Loss = "cauchy"
-    loss_scale: float = 1.5
+    loss_scale: float = 3.0
     range_std: float = 0.06
     rods: tuple[tuple[int, int], ...] = ((1, 2), (3, 4), (5, 6), (7, 8), (9, 10), (11, 12))
     rod_length: float = 1.6
     rod_length_std: float = 0.1
     rod_std: float = 0.03
-    survey_std: float = 0.02
-    knot_s: float = 0.2
-    diffusion: float = 0.05
+    survey_std: float = 0.05
+    knot_s: float = 0.4
+    diffusion: float = 0.1
     offset_m: float = 3.9
     offset_std: float = 0.5
-    module_std: float = 0.1
-    pair_std: float = 0.1
+    module_std: float = 0.05
+    pair_std: float = 0.05
 
     @property
     def core_loss(self) -> RangeLoss:

@@ -29,7 +29,6 @@ from tensegrity.ranging.recording import Anchors, RangeRecording
 FloatArray = NDArray[np.float64]
 
 _KNOT_S = 1.0
-_DIFFUSION = 0.1  # [m^2/s]
 _SNAPSHOT_S, _GAP_S = 0.25, 1.0
 _HEIGHT_STD_M = 0.3  # of anchors and modules about the start
 _WANDER_STD_M = 0.1  # of modules in the plane about the start
@@ -65,9 +64,11 @@ def search(
 
     Raises :class:`InputError` when there is nothing to start from.
     """
-    coarse = replace(model, offsets="constant", knot_s=_KNOT_S, diffusion=_DIFFUSION)
+    coarse = replace(model, offsets="constant", knot_s=_KNOT_S)
     unknown = Anchors(recording.anchors, np.full((len(recording.anchors), 3), np.nan))
     node, time, ranges = snapshots(recording, recording.anchors.tolist(), _SNAPSHOT_S, _GAP_S)
+    enough = np.isfinite(ranges).sum(axis=1) >= 3
+    node, time, ranges = node[enough], time[enough], ranges[enough]
     terms = OffsetTerms.of(coarse, recording.nodes, unknown.ids)
     strips = Strips.of(recording, coarse)
     first, second = (

@@ -32,8 +32,9 @@ LEAST_SNAPSHOTS = 15
 """With ranges to the same three anchors; the quadratic form has six coefficients."""
 
 _TRIPLES = 3  # tried per start
-_MOST_SNAPSHOTS = 400  # as many as C takes of its recording
+_MOST_SNAPSHOTS = 400  # to one set of anchors; as many as C takes of its recording
 _OFFSET_STEPS_M = (-0.2, 0.2)  # about the expected offset: errors of 0.2 m shift anchors by as much
+_PLACED_SNAPSHOTS = 800
 _LEAST_EIGENVALUE = 0.02  # of the metric, relative: flatter triangles are noise
 _ROBUST_ROUNDS = 6
 _LEAST_TURN_M = 0.1  # residual at which the loss turns, at least
@@ -76,11 +77,16 @@ def find_start(ranges_m: FloatArray, offset_m: float, rng: np.random.Generator) 
     anchors = np.full((ranges_m.shape[1], 3), np.nan)
     anchors[triple] = positions
     while True:
-        modules = place_modules(anchors, ranges_m, offset)
-        grown = _grow(anchors, ranges_m - offset, modules)
+        some = _seen_by(anchors, ranges_m, rng)
+        modules = place_modules(anchors, ranges_m[some], offset)
+        grown = _grow(anchors, ranges_m[some] - offset, modules)
         if np.array_equal(grown, anchors, equal_nan=True):
-            return Start(anchors, modules, offset)
+            break
         anchors = grown
+    some = _seen_by(anchors, ranges_m, rng, _PLACED_SNAPSHOTS)
+    modules = np.full((len(ranges_m), 3), np.nan)
+    modules[some] = place_modules(anchors, ranges_m[some], offset)
+    return Start(anchors, modules, offset)
 
 
 def closed_form(ranges_m: FloatArray, offset_m: float) -> tuple[FloatArray, float] | None:
@@ -123,6 +129,15 @@ def place_modules(anchors_m: FloatArray, ranges_m: FloatArray, offset_m: float) 
         anchors, distances, anchors.mean(axis=0), plane_normal(anchors), _LOSS_SCALE_M
     )
     return position
+
+
+def _seen_by(
+    anchors: FloatArray, ranges_m: FloatArray, rng: np.random.Generator, most: int = _MOST_SNAPSHOTS
+) -> IntArray:
+    """Up to ``most`` random snapshots that see three known anchors."""
+    known = np.isfinite(anchors).all(axis=1)
+    seen = np.flatnonzero(np.isfinite(ranges_m[:, known]).sum(axis=1) >= 3)
+    return rng.permutation(seen)[:most]
 
 
 def _grow(anchors: FloatArray, distances: FloatArray, modules: FloatArray) -> FloatArray:

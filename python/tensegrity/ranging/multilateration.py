@@ -12,7 +12,7 @@ FloatArray = NDArray[np.float64]
 _CLOSEST_M = 1e-6
 _FIRST_DAMPING = 1e-2
 _NARROWING = (30.0, 5.0, 1.0)
-_ITERATIONS = 6  # at each scale
+_ITERATIONS = 4  # at each scale
 
 
 @dataclass(frozen=True)

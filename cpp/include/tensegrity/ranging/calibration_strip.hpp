@@ -81,6 +81,7 @@ class CalibrationStripSolver {
     shared_information_.resize(static_cast<std::size_t>(width_) * width_);
     shared_gradient_.resize(width_);
     reduced_.resize(static_cast<std::size_t>(width_ + 1) * (width_ + 1));
+    border_step_.resize(width_ + 1);
   }
 
   std::vector<Scalar>& positions() { return positions_; }
@@ -154,30 +155,40 @@ class CalibrationStripSolver {
       for (int i = 0; i < kSize; ++i) {
         factor[i * kSize + i] += damping * (factor[i * kSize + i] + range_information);
       }
-      Scalar* block = &eliminated_[static_cast<std::size_t>(kSize) * columns * k];
-      std::copy_n(&cross_[static_cast<std::size_t>(kSize) * width_ * k], kSize * width_, block);
-      std::copy_n(&gradient_[kSize * k], kSize, block + kSize * width_);
+      Scalar* rows = &eliminated_[static_cast<std::size_t>(kSize) * columns * k];
+      for (int i = 0; i < kSize; ++i) {
+        std::copy_n(&cross(k, i, 0), width_, rows + columns * i);
+        rows[columns * i + width_] = gradient_[kSize * k + i];
+      }
       if (k > 0) {
         const Scalar* link = &link_[kSize * kSize * (k - 1)];
-        subtract_product(link, link, kSize, factor);
-        subtract_product(link, block - kSize * columns, columns, block);
+        const Scalar* before = rows - kSize * columns;
+        for (int i = 0; i < kSize; ++i) {
+          for (int m = 0; m < kSize; ++m) {
+            for (int j = 0; j < kSize; ++j) {
+              factor[kSize * i + j] -= link[kSize * m + i] * link[kSize * m + j];
+            }
+            subtract(link[kSize * m + i], before + columns * m, columns, rows + columns * i);
+          }
+        }
       }
       if (!cholesky(factor)) return false;
       Scalar* link = &link_[kSize * kSize * k];
       std::copy_n(&coupling_[kSize * kSize * k], kSize * kSize, link);
       forward(factor, link, kSize);
-      forward(factor, block, columns);
+      forward(factor, rows, columns);
       for (int j = 0; j < columns; ++j) {
-        const Scalar* b = block + kSize * j;
         Scalar* out = &reduced_[columns * j];
-        for (int i = 0; i <= j; ++i) out[i] += dot(block + kSize * i, b);
+        for (int m = 0; m < kSize; ++m) {
+          subtract(rows[columns * m + j], rows + columns * m, j + 1, out);
+        }
       }
     }
     for (int j = 0; j < width_; ++j) {
-      gradient[border_[j]] -= reduced_[columns * width_ + j];
+      gradient[border_[j]] += reduced_[columns * width_ + j];
       for (int i = 0; i <= j; ++i) {
-        information(border_[i], border_[j]) -= reduced_[columns * j + i];
-        if (i != j) information(border_[j], border_[i]) -= reduced_[columns * j + i];
+        information(border_[i], border_[j]) += reduced_[columns * j + i];
+        if (i != j) information(border_[j], border_[i]) += reduced_[columns * j + i];
       }
     }
     return true;
@@ -186,23 +197,22 @@ class CalibrationStripSolver {
   // The step of the knots that goes with the step of the shared parameters; makes the trial.
   void substitute(const Shared& shared_step) {
     const int columns = width_ + 1;
+    for (int j = 0; j < width_; ++j) border_step_[j] = shared_step[border_[j]];
+    border_step_[width_] = 1;  // times the eliminated gradient
     for (int k = knots_ - 1; k >= 0; --k) {
-      const Scalar* block = &eliminated_[static_cast<std::size_t>(kSize) * columns * k];
+      const Scalar* rows = &eliminated_[static_cast<std::size_t>(kSize) * columns * k];
+      const Scalar* link = &link_[kSize * kSize * k];
+      const Scalar* factor = &factor_[kSize * kSize * k];
       Scalar* x = &step_[kSize * k];
-      for (int i = 0; i < kSize; ++i) x[i] = -block[kSize * width_ + i];
-      for (int j = 0; j < width_; ++j) {
-        const Scalar s = shared_step[border_[j]];
-        for (int i = 0; i < kSize; ++i) x[i] -= block[kSize * j + i] * s;
-      }
-      if (k + 1 < knots_) {
-        const Scalar* link = &link_[kSize * kSize * k];
-        for (int j = 0; j < kSize; ++j) {
-          for (int i = 0; i < kSize; ++i) x[i] -= link[kSize * j + i] * x[kSize + j];
+      for (int i = 0; i < kSize; ++i) {
+        x[i] = 0;
+        for (int j = 0; j < columns; ++j) x[i] -= rows[columns * i + j] * border_step_[j];
+        if (k + 1 < knots_) {
+          for (int j = 0; j < kSize; ++j) x[i] -= link[kSize * i + j] * x[kSize + j];
         }
       }
-      const Scalar* factor = &factor_[kSize * kSize * k];
       for (int i = kSize - 1; i >= 0; --i) {
-        for (int j = i + 1; j < kSize; ++j) x[i] -= factor[kSize * i + j] * x[j];
+        for (int j = i + 1; j < kSize; ++j) x[i] -= factor[kSize * j + i] * x[j];
         x[i] /= factor[kSize * i + i];
       }
     }
@@ -280,10 +290,10 @@ class CalibrationStripSolver {
     }
   }
 
-  Scalar& diagonal(int k, int i, int j) { return diagonal_[kSize * (kSize * k + j) + i]; }
-  Scalar& coupling(int k, int i, int j) { return coupling_[kSize * (kSize * k + j) + i]; }
+  Scalar& diagonal(int k, int i, int j) { return diagonal_[kSize * (kSize * k + i) + j]; }
+  Scalar& coupling(int k, int i, int j) { return coupling_[kSize * (kSize * k + i) + j]; }
   Scalar& cross(int k, int i, int column) {
-    return cross_[static_cast<std::size_t>(kSize) * (width_ * k + column) + i];
+    return cross_[static_cast<std::size_t>(width_) * (kSize * k + i) + column];
   }
 
   void add_range(const Row& row, const Shared& shared, const RobustLoss<Scalar>& loss) {
@@ -348,45 +358,35 @@ class CalibrationStripSolver {
     shared_information_[rod_column_ * width_ + rod_column_] += information;
   }
 
-  static Scalar dot(const Scalar* a, const Scalar* b) {
-    Scalar sum = 0;
-    for (int i = 0; i < kSize; ++i) sum += a[i] * b[i];
-    return sum;
+  // out -= factor * row
+  static void subtract(Scalar factor, const Scalar* row, int columns, Scalar* out) {
+    for (int j = 0; j < columns; ++j) out[j] -= factor * row[j];
   }
 
-  // out -= transpose(a) * b, a of kSize x kSize, b and out of kSize x columns; column-major.
-  static void subtract_product(const Scalar* a, const Scalar* b, int columns, Scalar* out) {
-    for (int j = 0; j < columns; ++j) {
-      for (int i = 0; i < kSize; ++i) out[kSize * j + i] -= dot(a + kSize * i, b + kSize * j);
-    }
-  }
-
-  // Lower triangle of a by Cholesky, in place.
+  // Lower triangle of the symmetric a by Cholesky, in place.
   static bool cholesky(Scalar* a) {
     for (int j = 0; j < kSize; ++j) {
       Scalar pivot = a[kSize * j + j];
-      for (int m = 0; m < j; ++m) pivot -= a[kSize * m + j] * a[kSize * m + j];
+      for (int m = 0; m < j; ++m) pivot -= a[kSize * j + m] * a[kSize * j + m];
       if (!(pivot > 0)) return false;
       pivot = std::sqrt(pivot);
       a[kSize * j + j] = pivot;
       for (int i = j + 1; i < kSize; ++i) {
-        Scalar sum = a[kSize * j + i];
-        for (int m = 0; m < j; ++m) sum -= a[kSize * m + i] * a[kSize * m + j];
-        a[kSize * j + i] = sum / pivot;
+        Scalar sum = a[kSize * i + j];
+        for (int m = 0; m < j; ++m) sum -= a[kSize * i + m] * a[kSize * j + m];
+        a[kSize * i + j] = sum / pivot;
       }
     }
     return true;
   }
 
-  // Columns of b become those of L^-1 b.
+  // Rows of b (kSize x columns) become those of L^-1 b.
   static void forward(const Scalar* lower, Scalar* b, int columns) {
-    Scalar inverse[kSize];
-    for (int i = 0; i < kSize; ++i) inverse[i] = 1 / lower[kSize * i + i];
-    for (int c = 0; c < columns; ++c, b += kSize) {
-      for (int j = 0; j < kSize; ++j) {
-        b[j] *= inverse[j];
-        for (int i = j + 1; i < kSize; ++i) b[i] -= lower[kSize * j + i] * b[j];
-      }
+    for (int i = 0; i < kSize; ++i) {
+      Scalar* row = b + columns * i;
+      for (int j = 0; j < i; ++j) subtract(lower[kSize * i + j], b + columns * j, columns, row);
+      const Scalar inverse = 1 / lower[kSize * i + i];
+      for (int c = 0; c < columns; ++c) row[c] *= inverse;
     }
   }
 
@@ -399,9 +399,9 @@ class CalibrationStripSolver {
   int rod_ = -1;  // among the shared parameters
   int rod_column_ = -1;
   std::vector<Scalar> positions_, trial_, step_, gradient_;
-  std::vector<Scalar> diagonal_, coupling_, cross_;           // normal equations, column-major
+  std::vector<Scalar> diagonal_, coupling_, cross_;           // normal equations, row by row
   std::vector<Scalar> factor_, link_, eliminated_, reduced_;  // and what elimination makes of them
-  std::vector<Scalar> shared_information_, shared_gradient_;
+  std::vector<Scalar> shared_information_, shared_gradient_, border_step_;
 };
 
 }  // namespace tensegrity::ranging
