@@ -123,9 +123,13 @@ class CalibrationSolver {
     return good;
   }
 
-  // Gradient of the cost after elimination of the trajectory is not kept; this one is by the shared
-  // parameters at the current state, valid after solve() or reduced_information().
+  // Gradient of the cost by the shared parameters and by the positions of a strip at the current
+  // state, as of the last solve() or reduced_information().
   const Shared& shared_gradient() const { return gradient_; }
+  const std::vector<Scalar>& gradient(std::size_t strip) const {
+    const Place place = order_[strip];
+    return place.rod ? rods_[place.index].gradient() : singles_[place.index].gradient();
+  }
 
   // Whitened residuals (predicted minus measured) in the order of the problem's ranges.
   void residuals(std::vector<Scalar>& out) const {

@@ -86,6 +86,8 @@ class CalibrationStripSolver {
 
   std::vector<Scalar>& positions() { return positions_; }
   const std::vector<Scalar>& positions() const { return positions_; }
+  // Of the cost by the positions, as of the last linearise().
+  const std::vector<Scalar>& gradient() const { return gradient_; }
 
   // Half the loss at the positions (`at_trial`: at those of the last step) and shared parameters.
   Scalar cost(const Shared& shared, const RobustLoss<Scalar>& loss, bool at_trial) const {
