@@ -50,10 +50,11 @@ class Simulator:
         self.net = net
         core = core_net(net, gravity=gravity, ground=ground)
         self._core: _core.NetSimulator | _core.NetSimulatorFloat
+        self._dtype: type[np.floating]
         if precision == "double":
-            self._core, self._dtype = _core.NetSimulator(core), np.dtype(np.float64)
+            self._core, self._dtype = _core.NetSimulator(core), np.float64
         else:
-            self._core, self._dtype = _core.NetSimulatorFloat(core), np.dtype(np.float32)
+            self._core, self._dtype = _core.NetSimulatorFloat(core), np.float32
 
     def step(
         self,
@@ -87,12 +88,12 @@ class Simulator:
             raise InputError(f"expected dt > 0 [s] and steps >= 0, got {dt:g} and {steps}")
         kind = _INTEGRATORS[integrator]
         if anchors is None:
-            status = self._core.step(rows, lengths, dt, steps, kind)  # type: ignore[arg-type]
+            status = self._core.step(rows, lengths, dt, steps, kind)
         else:
             where = np.asfortranarray(np.atleast_2d(anchors), dtype=self._dtype).copy(order="F")
             if where.shape != (len(rows), 2 * n):
                 raise InputError(f"anchors: expected shape ({len(rows)}, {2 * n})")
-            status = self._core.step(rows, where, lengths, dt, steps, kind)  # type: ignore[arg-type]
+            status = self._core.step(rows, where, lengths, dt, steps, kind)
             anchors[...] = where.reshape(anchors.shape)
         if status != _core.Status.OK:
             raise FloatingPointError(
@@ -225,11 +226,9 @@ def _linearised(net: Net) -> tuple[FloatArray, FloatArray]:
     positions = net.undeformed_positions()
     n = len(positions)
     stiffness, damping = np.zeros((n, 3, n, 3)), np.zeros((n, 3, n, 3))
-    members = [
-        *zip(net.rod_ends(), net.rods, [net.rod_length] * len(net.rods), strict=True),
-        *zip(net.cable_ends(), net.cables, net.rest_lengths(), strict=True),
-    ]
-    for (a, b), member, rest in members:
+    ends = np.concatenate([net.rod_ends(), net.cable_ends()])
+    rest_lengths = np.concatenate([np.full(len(net.rods), net.rod_length), net.rest_lengths()])
+    for (a, b), member, rest in zip(ends, net.members, rest_lengths, strict=True):
         vector = positions[b] - positions[a]
         length = np.linalg.norm(vector)
         along = np.outer(vector, vector) / length**2

@@ -204,6 +204,11 @@ class Net(StrictModel):
         )
 
     @property
+    def members(self) -> tuple[NetRod | NetCable, ...]:
+        """The rods, then the cables."""
+        return (*self.rods, *self.cables)
+
+    @property
     def node_ids(self) -> tuple[int, ...]:
         """Ids in the order of ``nodes``."""
         return tuple(node.id for node in self.nodes)
