@@ -205,6 +205,16 @@ TEST_CASE("range model: the module sits inside the rod's end") {
   CHECK(AnchorDistance<double>(here, V3(1, 2, 0)).distance == doctest::Approx(3.1));
 }
 
+TEST_CASE("range model: points in one place leave everything finite") {
+  const V3 here(1, 2, 3);
+  const Module<double> squeezed(here, here, 0.1);
+  CHECK(squeezed.position == here);
+  const AnchorDistance<double> touching(squeezed, here);
+  CHECK(touching.distance == 0);
+  CHECK((touching.by_end.isZero() && touching.by_far_end.isZero() && touching.by_anchor.isZero()));
+  CHECK(ModuleDistance<double>(squeezed, squeezed).by_second_end.isZero());
+}
+
 TEST_CASE("range model: derivatives against finite differences") {
   constexpr double kInset = 0.1, kStep = 1e-6, kError = 1e-9;
   std::srand(3);

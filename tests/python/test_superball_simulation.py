@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from tensegrity import robots
+from tensegrity.dynamics import relax
 from tensegrity.errors import InputError
 from tensegrity.ranging.sequence import RangingSequence, read_sequence, write_sequence
 from tensegrity.simulation.superball import SuperballOptions, simulate_superball
@@ -69,6 +71,19 @@ def test_the_robot_keeps_its_rods_and_stays_on_the_ground(exact: RangingSequence
     # Soft ground gives way by some centimetres in a fall.
     assert nodes[:, :, 2].min() > -0.05
     assert np.sort(nodes[:, :, 2], axis=1)[:, 2].max() < 0.3
+
+
+def test_at_rest_it_has_the_shape_of_the_net_in_equilibrium(exact: RangingSequence) -> None:
+    """Two models that share the description only: rigid rods here, springs there."""
+    resting = truth(exact)[1][0]
+    springs = relax(exact.net, start=resting, gravity=True)
+    height = resting[:, 2].mean() - springs[:, 2].mean()
+    # Feet are spheres here and points there, which sink in by the weight over the stiffness.
+    assert 0 < height < 0.03
+    centred = [nodes - nodes.mean(axis=0) for nodes in (resting, springs)]
+    turn, _ = Rotation.align_vectors(*centred)
+    assert turn.magnitude() < np.radians(1)
+    np.testing.assert_allclose(turn.apply(centred[1]), centred[0], atol=5e-3)
 
 
 def test_a_roll_leads_to_the_next_face_along_x(exact: RangingSequence) -> None:
@@ -245,7 +260,7 @@ def test_unknown_nodes_in_files_are_errors(noisy: RangingSequence, tmp_path: Pat
     [
         ({"round_rate": 100.0}, r"'round_rate'.*15 \[Hz\]"),
         ({"strokes": 0.3}, r"did you mean 'stroke'"),
-        ({"duration": -1.0}, r"'duration'.*\[s\]"),
+        ({"duration": 0.5}, r"'duration'.*2 \[s\]"),
     ],
 )
 def test_impossible_options_are_errors(options: dict[str, Any], message: str) -> None:

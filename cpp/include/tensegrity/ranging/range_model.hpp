@@ -5,14 +5,25 @@
 //
 //   m = e + inset u,   dm/df = (inset/|f - e|) (I - u u'),   dm/de = I - dm/df.
 //
-// Ends, not centres of modules, are the nodes of the net, so a range depends on both ends of a rod.
+// Ends, not modules, are the nodes of the net, so a range depends on both ends of a rod. Points in
+// one place have no direction between them: derivatives by them are zero there.
 #pragma once
 
 #include "tensegrity/types.hpp"
 
 namespace tensegrity::ranging {
 
-// Where a module is, from the two ends of its rod, which are not in one place.
+namespace detail {
+
+// Of unit length, or zero.
+template <typename Scalar>
+Vector3<Scalar> direction(const Vector3<Scalar>& line, Scalar length) {
+  return length > 0 ? Vector3<Scalar>(line / length) : Vector3<Scalar>(Vector3<Scalar>::Zero());
+}
+
+}  // namespace detail
+
+// Where a module is, from the two ends of its rod.
 template <typename Scalar>
 struct Module {
   Vector3<Scalar> position;  // [m], frame of the ends
@@ -22,9 +33,10 @@ struct Module {
   Module(const Vector3<Scalar>& end, const Vector3<Scalar>& far_end, Scalar inset) {
     const Vector3<Scalar> rod = far_end - end;
     const Scalar length = rod.norm();
-    const Vector3<Scalar> axis = rod / length;
+    const Vector3<Scalar> axis = detail::direction(rod, length);
+    const Scalar share = length > 0 ? inset / length : Scalar(0);
     position = end + inset * axis;
-    by_far_end = (inset / length) * (Matrix3<Scalar>::Identity() - axis * axis.transpose());
+    by_far_end = share * (Matrix3<Scalar>::Identity() - axis * axis.transpose());
     by_end = Matrix3<Scalar>::Identity() - by_far_end;
   }
 };
@@ -40,7 +52,7 @@ struct AnchorDistance {
   AnchorDistance(const Module<Scalar>& module, const Vector3<Scalar>& anchor) {
     const Vector3<Scalar> line = module.position - anchor;
     distance = line.norm();
-    const Vector3<Scalar> direction = line / distance;
+    const Vector3<Scalar> direction = detail::direction(line, distance);
     by_end = module.by_end.transpose() * direction;
     by_far_end = module.by_far_end.transpose() * direction;
     by_anchor = -direction;
@@ -60,7 +72,7 @@ struct ModuleDistance {
   ModuleDistance(const Module<Scalar>& first, const Module<Scalar>& second) {
     const Vector3<Scalar> line = first.position - second.position;
     distance = line.norm();
-    const Vector3<Scalar> direction = line / distance;
+    const Vector3<Scalar> direction = detail::direction(line, distance);
     by_first_end = first.by_end.transpose() * direction;
     by_first_far_end = first.by_far_end.transpose() * direction;
     by_second_end = -(second.by_end.transpose() * direction);

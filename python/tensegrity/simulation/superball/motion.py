@@ -33,10 +33,14 @@ class Motion(Protocol):
 
     first_face: Face
     """Indices of the nodes that are down at first."""
+    cable_speed: float
+    """Fastest change of a rest length [m/s]."""
+    duration: float
+    """Of a recording of which nothing else is said [s]."""
 
-    def course(self, nodes: FloatArray) -> float:
+    def course(self, nodes: FloatArray) -> float | None:
         """Direction in which the robot will go from x toward y [rad], with the nodes (n, 3) lying
-        on the first face."""
+        on the first face; None when it stays."""
         ...
 
     def rest_lengths(self, time: float, nodes: FloatArray) -> FloatArray:
@@ -80,6 +84,8 @@ class Rolling:
     the right and to the left, so that the robot keeps a straight line.
     """
 
+    duration = 75.0
+
     _REST_S = 2.0
     _PATIENCE_S = 2.0  # with the cable as short as it gets
 
@@ -90,6 +96,7 @@ class Rolling:
         follow each other in this way."""
         self._faces = Faces(net)
         self._nominal = net.rest_lengths()
+        self.cable_speed = cable_speed
         self._stroke, self._full_travel_s = stroke, stroke / cable_speed
         ends = {index: frozenset(net.cable_ends()[index].tolist()) for index in net.actuated()}
         self._cables = {
@@ -149,6 +156,9 @@ class Local:
     Both cables end at node 2, and none that moves at node 1, which is on the same rod.
     """
 
+    cable_speed = 0.3  # steps are taken as fast as motors can
+    duration = 60.0
+
     _CABLES = (frozenset((2, 5)), frozenset((4, 2)))
     _FACE = (4, 10, 12)  # rod 1-2 is level
     _AMPLITUDE_M = 0.12
@@ -170,8 +180,8 @@ class Local:
         self.first_face = first, second, third
         self._nominal = net.rest_lengths()
 
-    def course(self, nodes: FloatArray) -> float:
-        return 0.0  # stays
+    def course(self, nodes: FloatArray) -> None:
+        return None
 
     def rest_lengths(self, time: float, nodes: FloatArray) -> FloatArray:
         held = np.floor(time / self._STEP_S) * self._STEP_S

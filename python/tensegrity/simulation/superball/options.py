@@ -14,7 +14,7 @@ class SuperballOptions(Options):
 
     seed: int = field("the same seed gives identical recordings", default=0, ge=0)
     duration: float | None = field(
-        "of the recording; none: 75 s rolling, 60 s local", unit="s", default=None, gt=0, le=3600
+        "of the recording; none: 75 s rolling, 60 s local", unit="s", default=None, ge=2, le=3600
     )
     still_start: float = field("standing still at the start", unit="s", default=2.0, ge=0)
     friction: float | None = field(
@@ -31,7 +31,7 @@ class SuperballOptions(Options):
         "how far a cable is shortened to roll", unit="m", default=0.45, gt=0, le=0.6
     )
 
-    round_rate: float = field("rounds of ranging", unit="Hz", default=10.0, gt=0, le=15)
+    round_rate: float = field("rounds of ranging", unit="Hz", default=10.0, ge=1, le=15)
     range_noise: float = field(
         "standard deviation with line of sight", unit="m", default=0.03, ge=0
     )

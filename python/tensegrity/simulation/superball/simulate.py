@@ -49,8 +49,6 @@ ANCHOR_POSITIONS_M = np.array(
     ]
 )
 
-_DURATION_S = {Experiment.ROLLING: 75.0, Experiment.LOCAL: 60.0}
-_LOCAL_CABLE_SPEED = 0.3  # steps are taken as fast as motors can [m/s]
 _START_M = np.array([-3.0, 0.0, 0.0])  # rolling leads along x
 _HEADING_STD = np.radians(12)
 _CONTROL_STEPS = round(CONTROL_PERIOD_S / STEP_S)
@@ -86,17 +84,17 @@ def simulate_superball(
     motion_rng, range_rng, imu_rng, motor_rng = (
         np.random.default_rng(seed) for seed in np.random.SeedSequence(options.seed).spawn(4)
     )
-    motion, cable_speed = _motion(experiment, net, options, motion_rng)
+    motion = _motion(experiment, net, options, motion_rng)
     world = NetWorld(
         net,
-        _lying(experiment, net, motion, motion_rng),
+        _lying(net, motion, motion_rng),
         _friction(net, options, motion_rng),
         _GROUND_TIME_CONSTANT_S,
     )
     _settle(world)
     log = StateLog(world)
-    duration = _DURATION_S[experiment] if options.duration is None else options.duration
-    rest_lengths = _move(log, motion, options.still_start, duration, cable_speed, progress)
+    duration = motion.duration if options.duration is None else options.duration
+    rest_lengths = _move(log, motion, options.still_start, duration, progress)
 
     nodes = _nodes(log)
     anchors = Anchors(np.array(ANCHOR_IDS, dtype=np.int64), ANCHOR_POSITIONS_M.copy())
@@ -158,11 +156,10 @@ def _experiment(name: str | Experiment) -> Experiment:
 
 def _motion(
     experiment: Experiment, net: Net, options: SuperballOptions, rng: np.random.Generator
-) -> tuple[Motion, float]:
-    """The motion and the speed of its cables [m/s]."""
+) -> Motion:
     if experiment is Experiment.ROLLING:
-        return Rolling(net, options.stroke, options.cable_speed, rng), options.cable_speed
-    return Local(net), _LOCAL_CABLE_SPEED
+        return Rolling(net, options.stroke, options.cable_speed, rng)
+    return Local(net)
 
 
 def _friction(net: Net, options: SuperballOptions, rng: np.random.Generator) -> float:
@@ -170,10 +167,9 @@ def _friction(net: Net, options: SuperballOptions, rng: np.random.Generator) -> 
     return varied if options.friction is None else options.friction
 
 
-def _lying(
-    experiment: Experiment, net: Net, motion: Motion, rng: np.random.Generator
-) -> FloatArray:
-    """Nodes (n, 3) of the undeformed robot with its first face on the ground."""
+def _lying(net: Net, motion: Motion, rng: np.random.Generator) -> FloatArray:
+    """Nodes (n, 3) of the undeformed robot with its first face on the ground: at the origin, or
+    where it can set out along x."""
     nodes = net.undeformed_positions()
     face = nodes[list(motion.first_face)]
     up = np.cross(face[1] - face[0], face[2] - face[0])
@@ -181,10 +177,10 @@ def _lying(
     upright, _ = Rotation.align_vectors([[0.0, 0.0, 1.0]], [up])
     nodes = upright.apply(nodes - face.mean(axis=0))
     course = motion.course(nodes)
-    if experiment is Experiment.ROLLING:
-        turn = rng.normal(0.0, _HEADING_STD) - course
-        return Rotation.from_rotvec([0.0, 0.0, turn]).apply(nodes) + _START_M
-    return Rotation.from_rotvec([0.0, 0.0, rng.uniform(-np.pi, np.pi)]).apply(nodes)
+    if course is None:
+        return Rotation.from_rotvec([0.0, 0.0, rng.uniform(-np.pi, np.pi)]).apply(nodes)
+    turn = rng.normal(0.0, _HEADING_STD) - course
+    return Rotation.from_rotvec([0.0, 0.0, turn]).apply(nodes) + _START_M
 
 
 def _settle(world: NetWorld) -> None:
@@ -207,17 +203,16 @@ def _move(
     motion: Motion,
     still_start: float,
     duration: float,
-    cable_speed: float,
     progress: Progress | None,
 ) -> FloatArray:
     """Stand, then move; returns the rest lengths (N, cables) [m], one row per
     :data:`CONTROL_PERIOD_S`."""
     world = log.world
     lengths = world.rest_lengths()
-    stride = cable_speed * STEP_S * _CONTROL_STEPS
+    stride = motion.cable_speed * CONTROL_PERIOD_S
     commanded = []
-    for number in range(round(duration / (STEP_S * _CONTROL_STEPS))):
-        time = number * STEP_S * _CONTROL_STEPS
+    for number in range(round(duration / CONTROL_PERIOD_S)):
+        time = number * CONTROL_PERIOD_S
         wanted = lengths
         if time >= still_start:
             wanted = motion.rest_lengths(time - still_start, world.nodes())
