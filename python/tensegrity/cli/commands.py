@@ -35,6 +35,13 @@ COMMANDS = {
         "Find anchors and range offsets from a recording of the moving robot.",
         "calibrate recordings/outdoor --anchors recordings/outdoor/anchors.csv --out calibration",
     ),
+    "track": Summary(
+        "Estimate where a ranging robot was.",
+        "track recordings/rolling --calibration calibrations/hall --out runs/rolling",
+    ),
+    "experiment": Summary(
+        "Repeat a published experiment in simulation.", "experiment superball-global --seeds 3"
+    ),
     "config": Summary("Print a filter configuration.", "config paper > my.yaml"),
     "version": Summary("Print the version.", "version"),
 }

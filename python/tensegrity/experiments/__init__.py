@@ -1,0 +1,1 @@
+"""Published experiments, simulated and repeated: the table and the figures of a paper."""
