@@ -34,7 +34,8 @@ LEAST_SNAPSHOTS = 15
 _TRIPLES = 3  # tried per start
 _MOST_SNAPSHOTS = 400  # to one set of anchors; as many as C takes of its recording
 _OFFSET_STEPS_M = (-0.2, 0.2)  # about the expected offset: errors of 0.2 m shift anchors by as much
-_PLACED_SNAPSHOTS = 800
+_GROWN_SNAPSHOTS = 200  # from which further anchors are found
+_PLACED_SNAPSHOTS = 500  # between which modules start
 _LEAST_EIGENVALUE = 0.02  # of the metric, relative: flatter triangles are noise
 _ROBUST_ROUNDS = 6
 _LEAST_TURN_M = 0.1  # residual at which the loss turns, at least
@@ -77,7 +78,7 @@ def find_start(ranges_m: FloatArray, offset_m: float, rng: np.random.Generator) 
     anchors = np.full((ranges_m.shape[1], 3), np.nan)
     anchors[triple] = positions
     while True:
-        some = _seen_by(anchors, ranges_m, rng)
+        some = _seen_by(anchors, ranges_m, rng, _GROWN_SNAPSHOTS)
         modules = place_modules(anchors, ranges_m[some], offset)
         grown = _grow(anchors, ranges_m[some] - offset, modules)
         if np.array_equal(grown, anchors, equal_nan=True):
@@ -132,7 +133,7 @@ def place_modules(anchors_m: FloatArray, ranges_m: FloatArray, offset_m: float) 
 
 
 def _seen_by(
-    anchors: FloatArray, ranges_m: FloatArray, rng: np.random.Generator, most: int = _MOST_SNAPSHOTS
+    anchors: FloatArray, ranges_m: FloatArray, rng: np.random.Generator, most: int
 ) -> IntArray:
     """Up to ``most`` random snapshots that see three known anchors."""
     known = np.isfinite(anchors).all(axis=1)

@@ -46,7 +46,9 @@ class Field:
             value = int(text) if self.integer else float(text)
         except ValueError:
             return None
-        return value if np.isfinite(value) and self.least <= value <= self.most else None
+        # NaN is not within limits, and infinity is beyond any.
+        good = self.least <= value <= self.most and abs(value) != np.inf
+        return value if good else None
 
 
 INT64_LEAST, INT64_MOST = -(2**63), 2**63 - 1
