@@ -28,8 +28,8 @@ Problem make_problem(int anchors, int offset_terms, int rod_lengths, const Doubl
                      const Doubles& prior_information, const Integers& strip_modules,
                      const Integers& strip_knots, const Integers& strip_rod,
                      const std::vector<Doubles>& motion_information, const Integers& indices,
-                     const Doubles& blend, const Doubles& range_m, double range_std,
-                     double rod_std) {
+                     const Doubles& blend, const Doubles& range_m, double range_std, double rod_std,
+                     const std::array<double, 3>& knot_information) {
   Problem problem;
   problem.anchors = anchors;
   problem.offset_terms = offset_terms;
@@ -42,6 +42,7 @@ Problem make_problem(int anchors, int offset_terms, int rod_lengths, const Doubl
   require(range_std > 0 && rod_std > 0, "standard deviations: expected more than 0 [m]");
   problem.range_std = range_std;
   problem.rod_std = rod_std;
+  problem.knot_information = knot_information;
 
   const auto strips = static_cast<py::ssize_t>(motion_information.size());
   require(
@@ -124,17 +125,17 @@ void bind_ranging_calibration(py::module_& m) {
                        const Integers& strip_knots, const Integers& strip_rod,
                        const std::vector<Doubles>& motion_information, const Integers& indices,
                        const Doubles& blend, const Doubles& range_m, double range_std,
-                       double rod_std) {
+                       double rod_std, const std::array<double, 3>& knot_information) {
              return Solver(make_problem(anchors, offset_terms, rod_lengths, prior_mean,
                                         prior_information, strip_modules, strip_knots, strip_rod,
                                         motion_information, indices, blend, range_m, range_std,
-                                        rod_std));
+                                        rod_std, knot_information));
            }),
            py::kw_only(), py::arg("anchors"), py::arg("offset_terms"), py::arg("rod_lengths"),
            py::arg("prior_mean"), py::arg("prior_information"), py::arg("strip_modules"),
            py::arg("strip_knots"), py::arg("strip_rod"), py::arg("motion_information"),
            py::arg("indices"), py::arg("blend"), py::arg("range_m"), py::arg("range_std"),
-           py::arg("rod_std"))
+           py::arg("rod_std"), py::arg("knot_information"))
       .def_property(
           "shared", [](const Solver& solver) { return Eigen::VectorXd(solver.shared()); },
           [](Solver& solver, const Eigen::VectorXd& shared) {

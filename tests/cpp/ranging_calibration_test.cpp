@@ -83,7 +83,7 @@ World<Scalar> make_world(bool with_motion) {
   for (int i = 3 * kAnchors + 1; i < 3 * kAnchors + 3; ++i) {
     problem.prior_information[i] = Scalar(100);
   }
-  problem.knot_information = Scalar(0);
+  problem.knot_information = {{Scalar(0), Scalar(0), Scalar(0)}};
   for (int strip = 0; strip < 2; ++strip) {
     const int modules = problem.strips[strip].modules;
     for (int module = 0; module < modules; ++module) {
@@ -266,7 +266,7 @@ TEST_CASE("a rod of known length holds what ranges alone leave open") {
   }
   ranges = kept;
   world.problem.prior_information.back() = 1e6;
-  world.problem.knot_information = 1e-4;
+  world.problem.knot_information = {{1e-4, 1e-4, 1e-4}};
   CalibrationSolver<double> solver(world.problem);
   set_truth(world, solver);
   disturb(solver, 0.05, 5);

@@ -28,7 +28,7 @@ BoolArray = NDArray[np.bool_]
 
 Solver = Literal["lm", "bfgs"]
 
-ATTEMPTS = 4
+ATTEMPTS = 3
 """Starts that are refined before the best is finished."""
 
 _OUTLIER_M = 0.5

@@ -20,6 +20,9 @@ IntArray = NDArray[np.int64]
 OffsetModel = Literal["constant", "module", "pair"]
 Loss = Literal["cauchy", "huber", "squares"]
 
+ANYWHERE_M = 100.0
+"""Standard deviation of a position of which nothing is known: recordings are local."""
+
 _MOST_TERMS = 4  # of one range's offset, as the C++ core has it
 
 
@@ -156,8 +159,10 @@ def build_solver(
     terms: OffsetTerms,
     strips: Strips,
     model: Model,
+    height_std: float = ANYWHERE_M,
 ) -> RangeCalibrationSolver:
-    """The solver for a recording; coordinates of ``anchors`` that are known are a prior."""
+    """The solver for a recording; coordinates of ``anchors`` that are known are a prior, and so is
+    z = 0 for all modules, with ``height_std`` [m]."""
     from tensegrity._core import RangeCalibrationSolver
 
     node = np.searchsorted(terms.nodes, recording.node)
@@ -192,6 +197,7 @@ def build_solver(
         range_m=recording.range_m,
         range_std=model.range_std,
         rod_std=model.rod_std,
+        knot_information=[1 / ANYWHERE_M**2, 1 / ANYWHERE_M**2, 1 / height_std**2],
     )
 
 

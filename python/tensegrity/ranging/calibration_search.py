@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tensegrity.ranging.calibration_model import (
+    ANYWHERE_M,
     Model,
     OffsetTerms,
     Strips,
@@ -30,11 +31,13 @@ FloatArray = NDArray[np.float64]
 
 _KNOT_S = 1.0
 _SNAPSHOT_S, _GAP_S = 0.25, 1.0
-_HEIGHT_STD_M = 0.3  # of anchors and modules about the start
+_ANCHOR_HEIGHT_M = 1.0  # standard deviation about the plane of the start
+_HEIGHT_STD_M = 0.3  # of modules
 _WANDER_STD_M = 0.1  # of modules in the plane about the start
-# Scale of the loss in standard deviations, standard deviation of the rods' distances [m].
-_COARSE = (10.0, 0.5)
-_MIDDLE = (3.0, 0.2)
+# Scale of the loss in standard deviations, and standard deviations of the rods' distances and of
+# the modules' heights about the plane [m].
+_COARSE = (10.0, 0.5, 0.5)
+_MIDDLE = (3.0, 0.2, ANYWHERE_M)
 _ITERATIONS = 40
 _TOLERANCE = 1e-3
 
@@ -72,8 +75,10 @@ def search(
     terms = OffsetTerms.of(coarse, recording.nodes, unknown.ids)
     strips = Strips.of(recording, coarse)
     first, second = (
-        build_solver(recording, unknown, terms, strips, replace(coarse, rod_std=rod_std))
-        for _, rod_std in (_COARSE, _MIDDLE)
+        build_solver(
+            recording, unknown, terms, strips, replace(coarse, rod_std=rod_std), height_std
+        )
+        for _, rod_std, height_std in (_COARSE, _MIDDLE)
     )
     loss = coarse.core_loss
     best: Guess | None = None
@@ -100,10 +105,12 @@ def search(
 
 
 def _with_heights(start: Start, rng: np.random.Generator) -> FloatArray:
-    """Anchors with random heights; those that were not found start in the middle of the others."""
+    """Anchors with random heights on one side of the plane: most stand higher than the robot.
+    Those that were not found start in the middle of the others."""
     middle = np.nanmean(start.anchors_m, axis=0)
     anchors = np.where(np.isfinite(start.anchors_m), start.anchors_m, middle)
-    return anchors + rng.normal(size=anchors.shape) * [0.0, 0.0, _HEIGHT_STD_M]
+    anchors[:, 2] = np.abs(rng.normal(scale=_ANCHOR_HEIGHT_M, size=len(anchors)))
+    return anchors
 
 
 def _trajectories(
@@ -125,5 +132,5 @@ def _trajectories(
             at = np.column_stack(
                 [np.interp(knot_t, time[own], start.modules_m[own, axis]) for axis in range(3)]
             )
-        modules[one] = at + rng.normal(size=at.shape) * spread
+        modules[one] = at * [1.0, 1.0, 0.0] + rng.normal(size=at.shape) * spread
     return modules

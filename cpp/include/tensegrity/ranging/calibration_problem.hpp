@@ -44,9 +44,9 @@ struct CalibrationProblem {
   std::vector<CalibrationRange<Scalar>> ranges;
   Scalar range_std = Scalar(0.1);  // [m]
   Scalar rod_std = Scalar(0.02);   // of the distance between a rod's modules at a knot [m]
-  // Every knot is within some 100 m of the origin: keeps unmeasured knots determined, tells
-  // nothing.
-  Scalar knot_information = Scalar(1e-4);  // [1/m^2]
+  // What is known about every module at every knot: x, y and z are about zero, each with this
+  // information [1/m^2]. A little of it keeps unmeasured knots determined.
+  std::array<Scalar, 3> knot_information{{Scalar(1e-4), Scalar(1e-4), Scalar(1e-4)}};
 
   int shared() const { return 3 * anchors + offset_terms + rod_lengths; }
 };

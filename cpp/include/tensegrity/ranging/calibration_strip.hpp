@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -103,7 +104,7 @@ class CalibrationStripSolver {
         sum += motion_information_[k] * moved * moved;
       }
     }
-    for (const Scalar x : at) sum += knot_information_ * x * x;
+    for (std::size_t i = 0; i < at.size(); ++i) sum += knot_information_[i % 3] * at[i] * at[i];
     if constexpr (Modules == 2) {
       if (rod_ >= 0) {
         for (int k = 0; k < knots_; ++k) {
@@ -122,8 +123,8 @@ class CalibrationStripSolver {
     for (int k = 0; k + 1 < knots_; ++k) add_motion(k);
     for (int k = 0; k < knots_; ++k) {
       for (int i = 0; i < kSize; ++i) {
-        diagonal(k, i, i) += knot_information_;
-        gradient_[kSize * k + i] += knot_information_ * positions_[kSize * k + i];
+        diagonal(k, i, i) += knot_information_[i % 3];
+        gradient_[kSize * k + i] += knot_information_[i % 3] * positions_[kSize * k + i];
       }
     }
     if constexpr (Modules == 2) {
@@ -393,7 +394,8 @@ class CalibrationStripSolver {
   }
 
   int knots_;
-  Scalar range_std_, rod_information_, knot_information_;
+  Scalar range_std_, rod_information_;
+  std::array<Scalar, 3> knot_information_;
   std::vector<Scalar> motion_information_;
   std::vector<Row> rows_;
   std::vector<int> border_;  // the shared parameter of each column
