@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tensegrity.errors import InputError
-from tensegrity.ranging.multilateration import locate, locate_either_side, plane_normal
+from tensegrity.ranging.multilateration import locate
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -126,9 +126,11 @@ def place_modules(anchors_m: FloatArray, ranges_m: FloatArray, offset_m: float) 
     position = np.full((len(ranges_m), 3), np.nan)
     enough = np.isfinite(ranges_m[:, known]).sum(axis=1) >= 3
     anchors, distances = anchors_m[known], ranges_m[enough][:, known] - offset_m
-    position[enough] = locate_either_side(
-        anchors, distances, anchors.mean(axis=0), plane_normal(anchors), _LOSS_SCALE_M
-    )
+    # One metre off the plane: in it, nothing tells up from down. Which side is settled later.
+    above = anchors.mean(axis=0)
+    above[2] += 1.0
+    start = np.broadcast_to(above, (len(distances), 3))
+    position[enough] = locate(anchors, distances, start, _LOSS_SCALE_M)[0]
     return position
 
 
@@ -156,10 +158,8 @@ def _grow(anchors: FloatArray, distances: FloatArray, modules: FloatArray) -> Fl
         scale = 1 / np.maximum(2 * d, 0.5)
         target = d**2 - (p**2).sum(axis=1)
         solution, _ = _robust_least_squares(design * scale[:, None], target * scale)
-        start = _on_both_sides(p, solution)
-        repeated = np.broadcast_to(d, (len(start), len(d)))
-        found, cost = locate(p, repeated, start, _LOSS_SCALE_M)
-        grown[anchor] = found[int(cost.argmin())] + middle
+        found, _ = locate(p, d[None], solution[None, :3], _LOSS_SCALE_M)
+        grown[anchor] = found[0] + middle
     return grown
 
 
@@ -187,13 +187,3 @@ def _robust_least_squares(design: FloatArray, target: FloatArray) -> tuple[Float
         turn = max(_LEAST_TURN_M, 1.5 * float(np.median(np.abs(residual))))
         weight = 1 / np.sqrt(1 + (residual / turn) ** 2)
     return solution, residual
-
-
-def _on_both_sides(points: FloatArray, solution: FloatArray) -> FloatArray:
-    """Starts (3, 3) for an anchor from (a, |a|^2): as solved, and on either side of the plane of
-    the points, where its distance from the plane follows from |a|^2 better than from a."""
-    anchor, square = solution[:3], float(solution[3])
-    normal = plane_normal(points)
-    flat = anchor - (anchor @ normal) * normal
-    height = np.sqrt(max(square - float(flat @ flat), 0.25))
-    return np.stack([anchor, flat + height * normal, flat - height * normal])
