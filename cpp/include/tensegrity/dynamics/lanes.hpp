@@ -36,13 +36,14 @@ struct Lanes {
     return any;
   }
 
-  // 1 / sqrt(a).
+  // 1 / sqrt(a) for a > 0, to the last bits. In single precision Eigen refines the processor's
+  // estimate, which is faster than root and division.
   static Vector inverse_sqrt(const Vector& a) {
     using Array = Eigen::Array<Scalar, kCount, 1>;
-    Vector root;
-    Eigen::Map<Array, Eigen::AlignedMax>(reinterpret_cast<Scalar*>(&root)) =
-        Eigen::Map<const Array, Eigen::AlignedMax>(reinterpret_cast<const Scalar*>(&a)).sqrt();
-    return Scalar(1) / root;
+    Vector result;
+    Eigen::Map<Array, Eigen::AlignedMax>(reinterpret_cast<Scalar*>(&result)) =
+        Eigen::Map<const Array, Eigen::AlignedMax>(reinterpret_cast<const Scalar*>(&a)).rsqrt();
+    return result;
   }
 };
 
