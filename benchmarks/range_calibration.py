@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tensegrity.ranging import RangeRecording, read_anchors, read_ranges
 from tensegrity.ranging.calibration import RangeCalibration, Solver, calibrate_ranges
 from tensegrity.ranging.calibration_frame import align
-from tensegrity.ranging.calibration_model import Model
+from tensegrity.ranging.calibration_model import CalibrationModel
 from tensegrity.ranging.prediction import prediction_errors
 
 FIT_S = 100.0
@@ -53,7 +53,7 @@ def predictions(folder: Path) -> None:
     fit, later = recording.between(0.0, FIT_S), recording.between(FIT_S, np.inf)
     print(f"\n{folder.name}: fit on the first {FIT_S:g} s, predict later ranges; median / 90 % [m]")
     print(f"{'solver':8}{'offsets':10}{'survey':8}{'all others':>18}{'other anchors only':>22}")
-    default = Model()
+    default = CalibrationModel()
     for solver, model, known in (
         ("lm", default, True),
         ("lm", default, False),

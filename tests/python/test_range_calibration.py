@@ -34,7 +34,7 @@ from tensegrity.ranging import (
 from tensegrity.ranging.calibration import RangeCalibration, calibrate_ranges
 from tensegrity.ranging.calibration_files import read_calibration, write_calibration
 from tensegrity.ranging.calibration_frame import RigidMotion, align, survey_frame
-from tensegrity.ranging.calibration_model import Model
+from tensegrity.ranging.calibration_model import CalibrationModel
 from tensegrity.ranging.calibration_start import closed_form
 from tensegrity.ranging.multilateration import Whereabouts, locate
 from tensegrity.ranging.prediction import prediction_errors
@@ -52,7 +52,7 @@ RODS = ((1, 2), (3, 4))
 ROD_M = 1.6
 OFFSET_M = 3.95
 NOISE_M = 0.06
-MODEL = Model(rods=RODS, rod_length=ROD_M)
+MODEL = CalibrationModel(rods=RODS, rod_length=ROD_M)
 FACTS = np.array([0.05, -0.04, 0.02, 0.03, -0.05, 0.01])  # offsets of the anchors [m]
 
 
@@ -337,6 +337,27 @@ class TestCalibration:
             other_anchors_only=True,
         )
         assert np.isfinite(strict).sum() < len(valid)
+
+    def test_offsets_within_the_robot_are_found(self, recording: RangeRecording) -> None:
+        rng = np.random.default_rng(8)
+        t_ns = np.arange(0, 39 * 10**9, 10**8)
+        node, other = rng.integers(1, 3, len(t_ns)), rng.integers(3, 5, len(t_ns))
+        distance = [
+            np.linalg.norm(module(int(a), t * 1e-9) - module(int(b), t * 1e-9))
+            for a, b, t in zip(node, other, t_ns, strict=True)
+        ]
+        ranges = np.array(distance) + 4.2 + rng.normal(scale=NOISE_M, size=len(t_ns))
+        ranges[::7] += 3.0  # reflections
+        internal = InternalRanges(t_ns, node, other, ranges)
+        result = calibrate_ranges(recording, ANCHORS, MODEL, internal=internal)
+        found = result.internal_offsets
+        assert set(zip(found.node.tolist(), found.anchor.tolist(), strict=True)) == {
+            (1, 3),
+            (1, 4),
+            (2, 3),
+            (2, 4),
+        }
+        np.testing.assert_allclose(found.offset_m, 4.2, atol=0.08)
 
     def test_progress_ends_at_one(self, recording: RangeRecording) -> None:
         fractions: list[float] = []

@@ -14,10 +14,15 @@ from tensegrity.errors import InputError
 from tensegrity.files import check_directory
 from tensegrity.ranging.calibration import ATTEMPTS, RangeCalibration, Solver, calibrate_ranges
 from tensegrity.ranging.calibration_files import CALIBRATION_FILE, write_calibration
-from tensegrity.ranging.calibration_model import Loss, Model, OffsetModel
-from tensegrity.ranging.recording import read_anchors, read_ranges
+from tensegrity.ranging.calibration_model import CalibrationModel, Loss, OffsetModel
+from tensegrity.ranging.recording import (
+    INTERNAL_RANGES_FILE,
+    read_anchors,
+    read_internal_ranges,
+    read_ranges,
+)
 
-_DEFAULT = Model()
+_DEFAULT = CalibrationModel()
 
 
 def calibrate(
@@ -74,7 +79,9 @@ def calibrate(
         recording = recording.between(
             -np.inf if start is None else start, np.inf if end is None else end
         )
-    model = Model(
+    inside = ranges / INTERNAL_RANGES_FILE
+    internal = read_internal_ranges(inside) if inside.exists() else None
+    model = CalibrationModel(
         offsets=offsets,
         loss=loss,
         loss_scale=loss_scale / _DEFAULT.range_std,
@@ -87,6 +94,7 @@ def calibrate(
             survey,
             model,
             solver=solver,
+            internal=internal,
             seed=seed,
             attempts=attempts,
             progress=progress,

@@ -19,9 +19,16 @@ from tensegrity.errors import InputError
 from tensegrity.ranging import calibration_bfgs, calibration_lm
 from tensegrity.ranging.calibration_checks import check
 from tensegrity.ranging.calibration_covariance import complaints
-from tensegrity.ranging.calibration_model import Model
+from tensegrity.ranging.calibration_internal import internal_offsets
+from tensegrity.ranging.calibration_model import CalibrationModel
 from tensegrity.ranging.calibration_solution import Residuals, Solution
-from tensegrity.ranging.recording import Anchors, Offsets, RangeRecording
+from tensegrity.ranging.recording import (
+    NO_OFFSETS,
+    Anchors,
+    InternalRanges,
+    Offsets,
+    RangeRecording,
+)
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -40,7 +47,8 @@ class RangeCalibration:
     """A calibrated constellation of anchors, and how well it is known.
 
     * ``anchors`` all solved, ``anchor_covariance`` (3A, 3A) [m^2]
-    * ``offsets`` of all pairs, ``offset_std`` (pairs,) [m]
+    * ``offsets`` of all pairs, ``offset_std`` (pairs,) [m]; ``internal_offsets`` of pairs within
+      the robot, none without internal ranges
     * ``rods`` and the distances between their modules, ``rod_length`` and ``rod_length_std`` [m]
     * ``knot_t`` (K,) [s] from the first range, or steps; ``modules`` positions (K, 3) by number [m]
     * ``residuals`` of the ranges that were used
@@ -55,13 +63,14 @@ class RangeCalibration:
     anchor_covariance: FloatArray
     offsets: Offsets
     offset_std: FloatArray
+    internal_offsets: Offsets
     rods: tuple[tuple[int, ...], ...]
     rod_length: FloatArray
     rod_length_std: FloatArray
     knot_t: FloatArray
     modules: dict[int, FloatArray]
     residuals: Residuals = field(repr=False)
-    model: Model
+    model: CalibrationModel
     free_motions: tuple[str, ...]
     warnings: tuple[str, ...]
     solver: Solver
@@ -101,10 +110,11 @@ class RangeCalibration:
 def calibrate_ranges(
     recording: RangeRecording,
     survey: Anchors | None = None,
-    model: Model | None = None,
+    model: CalibrationModel | None = None,
     *,
     solver: Solver = "lm",
     trusted: BoolArray | None = None,
+    internal: InternalRanges | None = None,
     seed: int = 0,
     attempts: int = ATTEMPTS,
     progress: Callable[[float], None] | None = None,
@@ -113,13 +123,14 @@ def calibrate_ranges(
 
     ``survey`` lists the anchors with the coordinates that are known; without it nothing is, and the
     result is in a frame of its own. ``trusted`` (N,) are C's alpha: ranges with a false flag are
-    left out. ``solver`` "bfgs" is C's own way. The result depends on ``seed`` only as far as the
-    minimum is reached more or less closely. ``progress`` is called with the fraction done.
+    left out. ``internal`` ranges of a timed recording give the offsets within the robot.
+    ``solver`` "bfgs" is C's own way. ``seed`` decides where the search starts, ``attempts`` how
+    often. ``progress`` is called with the fraction done.
 
     Raises :class:`InputError` when the recording cannot be calibrated, saying why.
     """
     started = time.perf_counter()
-    model = model or Model()
+    model = model or CalibrationModel()
     report = progress or (lambda fraction: None)
     alpha = np.ones(len(recording), dtype=np.bool_) if trusted is None else trusted
     used = recording.where(alpha)
@@ -135,13 +146,21 @@ def calibrate_ranges(
         solution = calibration_bfgs.solve(used, survey, model, rng, report)
     else:
         solution = calibration_lm.solve(used, survey, model, rng, attempts, report)
-    result = _calibration(solution, survey, model, solver, time.perf_counter() - started)
+    within = NO_OFFSETS
+    if internal is not None and used.timed and solver == "lm":
+        within = internal_offsets(internal, int(used.t_ns[0]), solution.knot_t, solution.modules)
+    result = _calibration(solution, within, survey, model, solver, time.perf_counter() - started)
     report(1.0)
     return result
 
 
 def _calibration(
-    solution: Solution, survey: Anchors, model: Model, solver: Solver, runtime_s: float
+    solution: Solution,
+    within: Offsets,
+    survey: Anchors,
+    model: CalibrationModel,
+    solver: Solver,
+    runtime_s: float,
 ) -> RangeCalibration:
     terms, count = solution.terms, 3 * len(survey)
     pairs = terms.jacobian()
@@ -153,6 +172,7 @@ def _calibration(
         anchor_covariance=covariance,
         offsets=Offsets(node.ravel(), anchor.ravel(), pairs @ solution.offset_terms_m),
         offset_std=np.sqrt(np.einsum("pi,ij,pj->p", pairs, own, pairs)),
+        internal_offsets=within,
         rods=solution.rods,
         rod_length=solution.rod_lengths_m,
         rod_length_std=np.sqrt(np.diag(solution.covariance)[count + len(terms) :]),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tensegrity.errors import InputError
 from tensegrity.ranging.calibration_frame import frame_of
-from tensegrity.ranging.calibration_model import Model, OffsetTerms, snapshots
+from tensegrity.ranging.calibration_model import CalibrationModel, OffsetTerms, snapshots
 from tensegrity.ranging.calibration_solution import Residuals, Solution
 from tensegrity.ranging.recording import Anchors, RangeRecording
 
@@ -41,7 +41,7 @@ class _Samples:
         ranges: FloatArray,
         survey: Anchors,
         terms: OffsetTerms,
-        model: Model,
+        model: CalibrationModel,
     ) -> None:
         self.node, self.time = node, time
         self.sample, self.anchor = np.nonzero(np.isfinite(ranges))
@@ -110,7 +110,7 @@ class _Samples:
 def solve(
     recording: RangeRecording,
     survey: Anchors,
-    model: Model,
+    model: CalibrationModel,
     rng: np.random.Generator,
     progress: Callable[[float], None],
 ) -> Solution:

@@ -17,6 +17,7 @@ from tensegrity.ranging.recording import (
     OFFSETS_FILE,
     Anchors,
     Offsets,
+    joined,
     read_anchors,
     read_offsets,
     write_anchors,
@@ -45,7 +46,8 @@ def write_calibration(
     """
     with new_directory(Path(path), marker=CALIBRATION_FILE, overwrite=overwrite) as folder:
         write_anchors(folder / ANCHORS_FILE, result.anchors)
-        write_offsets(folder / OFFSETS_FILE, result.offsets)
+        offsets = joined(result.offsets, result.internal_offsets)
+        write_offsets(folder / OFFSETS_FILE, offsets)
         text = json.dumps(report_of(result), indent=2) + "\n"
         (folder / CALIBRATION_FILE).write_text(text, encoding="utf-8")
         if figures:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tensegrity.ranging.calibration_covariance import determine, variance_factor
 from tensegrity.ranging.calibration_frame import frame_of
 from tensegrity.ranging.calibration_model import (
-    Model,
+    CalibrationModel,
     OffsetTerms,
     Strips,
     build_solver,
@@ -33,7 +33,7 @@ _SEARCH_SHARE = 0.7  # of the time, for progress
 def solve(
     recording: RangeRecording,
     survey: Anchors,
-    model: Model,
+    model: CalibrationModel,
     rng: np.random.Generator,
     attempts: int,
     progress: Callable[[float], None],

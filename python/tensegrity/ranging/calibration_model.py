@@ -27,7 +27,7 @@ _MOST_TERMS = 4  # of one range's offset, as the C++ core has it
 
 
 @dataclass(frozen=True)
-class Model:
+class CalibrationModel:
     """What is assumed about ranges, rods, motion and offsets; standard deviations unless said.
 
     * ``offsets``: one for all ranges, plus one term per module, plus one per pair
@@ -76,7 +76,7 @@ class OffsetTerms:
     prior_std: FloatArray = field(repr=False)
 
     @classmethod
-    def of(cls, model: Model, nodes: IntArray, anchors: IntArray) -> OffsetTerms:
+    def of(cls, model: CalibrationModel, nodes: IntArray, anchors: IntArray) -> OffsetTerms:
         """Terms for all pairs of ``nodes`` and ``anchors``."""
         spread: list[FloatArray] = [np.array([model.offset_std])]
         if model.offsets != "constant":
@@ -132,7 +132,7 @@ class Strips:
     connected: bool
 
     @classmethod
-    def of(cls, recording: RangeRecording, model: Model) -> Strips:
+    def of(cls, recording: RangeRecording, model: CalibrationModel) -> Strips:
         """All modules of a recording; rods with only one ranged end are single modules."""
         nodes = set(recording.nodes.tolist())
         modules: list[tuple[int, ...]] = [rod for rod in model.rods if nodes.issuperset(rod)]
@@ -158,7 +158,7 @@ def build_solver(
     anchors: Anchors,
     terms: OffsetTerms,
     strips: Strips,
-    model: Model,
+    model: CalibrationModel,
     height_std: float = ANYWHERE_M,
 ) -> RangeCalibrationSolver:
     """The solver for a recording; coordinates of ``anchors`` that are known are a prior, and so is
@@ -201,7 +201,7 @@ def build_solver(
     )
 
 
-def survey_information(anchors: Anchors, model: Model) -> FloatArray:
+def survey_information(anchors: Anchors, model: CalibrationModel) -> FloatArray:
     """What the survey tells about the coordinates (3 A,) of the anchors [1/m^2]."""
     return anchors.known.ravel() / model.survey_std**2
 

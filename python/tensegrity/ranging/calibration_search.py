@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tensegrity.ranging.calibration_model import (
     ANYWHERE_M,
-    Model,
+    CalibrationModel,
     OffsetTerms,
     Strips,
     build_solver,
@@ -58,7 +58,7 @@ class Guess:
 
 def search(
     recording: RangeRecording,
-    model: Model,
+    model: CalibrationModel,
     rng: np.random.Generator,
     attempts: int,
     progress: Callable[[float], None],

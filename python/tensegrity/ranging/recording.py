@@ -181,6 +181,20 @@ class Offsets:
         return np.array([[known.get((int(n), a), np.nan) for a in columns] for n in nodes])
 
 
+NO_OFFSETS = Offsets(
+    np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.float64)
+)
+
+
+def joined(one: Offsets, other: Offsets) -> Offsets:
+    """The pairs of both."""
+    return Offsets(
+        np.concatenate([one.node, other.node]),
+        np.concatenate([one.anchor, other.anchor]),
+        np.concatenate([one.offset_m, other.offset_m]),
+    )
+
+
 @dataclass(frozen=True)
 class FloorTruth:
     """Where modules rested on the floor: from ``start_s`` to ``end_s`` [s], ``node`` (F,),
