@@ -39,6 +39,10 @@ def experiment(
         ),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, max=100, help="Simulated recordings.")] = 1,
+    duration: Annotated[
+        float | None,
+        typer.Option(min=8, max=600, help="Of a recording [s].", show_default="75 or 60"),
+    ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the results that are already there.")
     ] = False,
@@ -51,7 +55,7 @@ def experiment(
         with progress_bar(name) as progress:
             for seed in range(seeds):
                 part = partial(_advance, progress, seed, seeds)
-                outcomes += run_experiment(kind, list(Setting), seed, part)
+                outcomes += run_experiment(kind, list(Setting), seed, duration, part)
         first = [outcome for outcome in outcomes if outcome.seed == 0]
         if kind is Experiment.LOCAL:
             draw_local(first[0], _LOCAL_NODES, folder / "end_caps.png")

@@ -3,8 +3,8 @@
 ``superball-local`` (C Fig. 6): the robot stands while two actuators move; paths of two end caps.
 ``superball-global`` (C Figs. 7, 8): it rolls over several faces, tracked with several settings.
 
-Every recording is calibrated by its own ranges first (C §III-C): the anchors are surveyed, the
-offsets are not.
+The offsets of the ranges are calibrated first (C §III-C), from a recording of the rolling robot: a
+robot that stands says little about them. The anchors are surveyed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tensegrity.ranging.calibration import calibrate_ranges
-from tensegrity.ranging.calibration_model import Model
+from tensegrity.ranging.calibration_model import CalibrationModel
 from tensegrity.ranging.recording import Anchors, Offsets
 from tensegrity.ranging.sequence import RangingSequence
 from tensegrity.simulation.superball import SuperballOptions, simulate_superball
@@ -91,17 +91,30 @@ def run_experiment(
     experiment: Experiment,
     settings: list[Setting],
     seed: int,
+    duration: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[Outcome]:
-    """Simulate one recording, calibrate it and track it with every setting."""
+    """Simulate one recording, calibrate its offsets and track it with every setting.
+
+    Offsets belong to the seed: both experiments of one seed have the same. ``duration`` of each
+    recording [s]; None is that of :func:`simulate_superball`.
+    """
     report = progress or (lambda fraction: None)
-    spurious = SPURIOUS_S if experiment is Experiment.ROLLING else None
-    sequence = simulate_superball(
-        experiment,
-        SuperballOptions(seed=seed, spurious_imu=spurious),
-        progress=lambda fraction: report(0.5 * fraction),
+    rolling = simulate_superball(
+        Experiment.ROLLING,
+        SuperballOptions(seed=seed, duration=duration, spurious_imu=SPURIOUS_S),
+        progress=lambda fraction: report(0.4 * fraction),
     )
-    calibration = calibrate_ranges(sequence.ranges, sequence.anchors, Model(offsets="pair"))
+    sequence = rolling
+    if experiment is Experiment.LOCAL:
+        sequence = simulate_superball(
+            experiment,
+            SuperballOptions(seed=seed, duration=duration),
+            progress=lambda fraction: report(0.4 + 0.1 * fraction),
+        )
+    calibration = calibrate_ranges(
+        rolling.ranges, rolling.anchors, CalibrationModel(offsets="pair")
+    )
     report(0.6)
     assert sequence.endcaps is not None  # a simulation knows the truth
     outcomes = []
