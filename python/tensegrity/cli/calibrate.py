@@ -105,8 +105,13 @@ def calibrate(
 
 
 def _print(result: RangeCalibration) -> None:
-    names = ("x [m]", "y [m]", "z [m]", "± x", "± y", "± z", "ranges", "median [m]", "90 % [m]")
-    table = Table("anchor", *(Column(name, justify="right") for name in names))
+    names = ("x", "y", "z", "± x, y, z", "ranges", "median", "90 %")
+    table = Table(
+        "anchor",
+        *(Column(name, justify="right") for name in names),
+        caption="positions and residuals of ranges in m, standard deviations in mm",
+        caption_justify="left",
+    )
     for anchor, position, std in zip(
         result.anchors.ids.tolist(), result.anchors.position_m, result.anchor_std, strict=True
     ):
@@ -114,7 +119,7 @@ def _print(result: RangeCalibration) -> None:
         table.add_row(
             str(anchor),
             *(f"{value:.3f}" for value in position),
-            *("–" if np.isnan(value) else f"{value:.3f}" for value in std),
+            "–" if np.isnan(std).any() else ", ".join(f"{1e3 * value:.0f}" for value in std),
             str(len(own)),
             *(f"{value:.3f}" for value in np.percentile(own, (50, 90))),
         )
