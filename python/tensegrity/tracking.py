@@ -88,7 +88,8 @@ def track(
     """Estimate the states of a recorded robot.
 
     ``anchors`` and ``offsets`` of a calibration take the place of the recording's own. A pair
-    without an offset gets the median of its anchor and is trusted less.
+    without an offset gets the median of its anchor and is trusted less; so does a module whose
+    offsets are one default for all anchors, while those of others differ.
 
     Raises :class:`InputError` when an anchor has no position, when there are no offsets, when the
     recording has no times, and when the filter never found a start.
@@ -137,7 +138,7 @@ def core_anchors(
     net: Net, anchors: Anchors, offsets: Offsets, settings: TrackSettings
 ) -> _core.RangingAnchors:
     """Anchors and offsets by index, with pairs that have none filled in."""
-    known = offsets.table(net.node_ids, anchors.ids)
+    known = _calibrated(offsets.table(net.node_ids, anchors.ids))
     std = np.where(np.isnan(known), settings.unknown_offset_std, settings.offset_std)
     internal = offsets.table(net.node_ids, net.node_ids)
     return _core.RangingAnchors(
@@ -235,6 +236,19 @@ def _check(sequence: RangingSequence, anchors: Anchors, offsets: Offsets | None)
             f"{sequence.name}: there are no offsets of the ranges",
             hint="raw ranges are some metres too long; calibrate first: tensegrity calibrate",
         )
+
+
+def _calibrated(offsets: FloatArray) -> FloatArray:
+    """Offsets (nodes, anchors) with NaN for modules that have one and the same number for every
+    anchor while others have not: a default that no calibration has touched."""
+    counts = np.sum(~np.isnan(offsets), axis=1)
+    spread = np.array(
+        [np.ptp(row[~np.isnan(row)]) if n else 0.0 for row, n in zip(offsets, counts, strict=True)]
+    )
+    default = (counts > 1) & (spread == 0)
+    if not (spread > 0).any():
+        return offsets
+    return np.where(default[:, None], np.nan, offsets)
 
 
 def _filled(offsets: FloatArray) -> FloatArray:

@@ -9,8 +9,8 @@
 // stamp: nodes are taken to move on with their velocities from the stamp to the update.
 //  - at or before the last update: kTooLate;
 //  - behind the newest of its own kind (pair of modules, rod, IMU): kOutOfOrder; equal: kDuplicate;
-//  - a time without ranges longer than `start_window` returns kGap: the filter starts again from
-//    the ranges that follow, since a robot that rolls is anywhere by then.
+//  - the first range after a time without any longer than `start_window` returns kGap: the filter
+//    starts again from the ranges that follow, since a robot that rolls is anywhere by then.
 //
 // Start: rigid poses of the undeformed robot are searched for in the first `start_window`
 // (pose_search.hpp). A filter whose innovations stay too large is lost: it starts again from the
@@ -25,6 +25,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -50,7 +52,7 @@ class RangingEstimator {
   RangingEstimator(const RangingRobot<Scalar>& robot, const RangingAnchors<Scalar>& anchors,
                    Dynamics dynamics, const ConstVectorRef<Scalar>& rest_lengths,
                    const RangingConfig<Scalar>& config = {})
-      : config_(config),
+      : config_(sane(config)),
         dynamics_(std::move(dynamics)),
         nodes_(int(robot.nodes.size())),
         model_(robot, anchors, 12 * nodes_ + 1),
@@ -60,7 +62,6 @@ class RangingEstimator {
                  config.start_ground_std}),
         rest_lengths_(rest_lengths),
         noise_(MatrixX<Scalar>::Zero(6 * nodes_, 6 * nodes_)),
-        density_(MatrixX<Scalar>::Zero(3 * nodes_, 3 * nodes_)),
         scratch_(VectorX<Scalar>::Zero(6 * nodes_)),
         values_(VectorX<Scalar>::Zero(kRows)),
         variances_(VectorX<Scalar>::Zero(kRows)),
@@ -157,10 +158,10 @@ class RangingEstimator {
   Status update(Nanoseconds t) {
     if (state_.initialized && t <= state_.t)
       return t == state_.t ? Status::kDuplicate : Status::kOutOfOrder;
-    now_ = std::max(now_, t);
+    if (state_.initialized && seconds(state_.t, t) > kLongestAbsence) stop();
     try_start(t);
     if (!state_.initialized) return Status::kNotInitialized;
-    while (next_ < t) step(next_);
+    while (state_.initialized && next_ < t) step(next_);
     if (state_.initialized && state_.t < t) step(t);
     return state_.initialized ? Status::kOk : Status::kNotInitialized;
   }
@@ -176,10 +177,13 @@ class RangingEstimator {
   static constexpr int kPending = 1024;  // measurements that wait
   static constexpr int kRecent = 4096;   // ranges of the last `start_window`
   static constexpr Nanoseconds kNever = INT64_MIN;
-  static constexpr Scalar kLongestImuGap = Scalar(0.5);  // [s], then the AHRS starts again
-  static constexpr Scalar kLongestRange = Scalar(300);   // no module of this class reaches it [m]
-  static constexpr Scalar kStandard = Scalar(9.81);      // gravity [m/s^2]
-  static constexpr int kRejectedInARow = 10;             // inclinations, then the AHRS starts again
+  static constexpr Scalar kLongestAbsence = Scalar(10);    // of all sensors [s], then a new start
+  static constexpr Scalar kShortestPeriod = Scalar(1e-3);  // [s]
+  static constexpr Scalar kShortestStep = Scalar(1e-4);    // of the dynamics [s]
+  static constexpr Scalar kLongestImuGap = Scalar(0.5);    // [s], then the AHRS starts again
+  static constexpr Scalar kLongestRange = Scalar(300);     // no module of this class reaches it [m]
+  static constexpr Scalar kStandard = Scalar(9.81);        // gravity [m/s^2]
+  static constexpr int kRejectedInARow = 10;  // inclinations, then the AHRS starts again
 
   struct Imu {
     ahrs::Madgwick<Scalar> ahrs;
@@ -191,7 +195,8 @@ class RangingEstimator {
   };
 
   static Scalar seconds(Nanoseconds from, Nanoseconds to) {
-    return Scalar(double(to - from) * 1e-9);
+    // Stamps are anything; their difference need not fit their type.
+    return Scalar((static_cast<long double>(to) - static_cast<long double>(from)) * 1e-9L);
   }
   static Nanoseconds nanoseconds(Scalar seconds) {
     return Nanoseconds(std::llround(double(seconds) * 1e9));
@@ -220,6 +225,14 @@ class RangingEstimator {
   std::size_t pairs() const { return std::size_t(nodes_) * model_.anchors().positions.size(); }
   std::size_t pair(int node, int anchor) const {
     return std::size_t(node) * model_.anchors().positions.size() + std::size_t(anchor);
+  }
+
+  // Times that would keep an update from ever coming to its end.
+  static RangingConfig<Scalar> sane(RangingConfig<Scalar> config) {
+    config.period = std::max(config.period, kShortestPeriod);
+    config.dynamics_step = std::max(config.dynamics_step, kShortestStep);
+    config.max_latency = std::max(config.max_latency, Scalar(0));
+    return config;
   }
 
   static UnscentedSettings<Scalar> filter_settings(const RangingConfig<Scalar>& config,
@@ -253,20 +266,14 @@ class RangingEstimator {
     if (status != Status::kOk) return drop(status);
     const Nanoseconds before = newest_any_range_;
     newest = row.t;
-    newest_any_range_ = std::max(newest_any_range_, row.t);
-    const bool gap =
-        before != kNever && seconds(before, row.t) > config_.start_window && state_.initialized;
-    if (gap) {
-      ++state_.health.gaps;
-      state_.initialized = false;
-      pending_.clear();
-      recent_.clear();
-    }
-    if (recent_.empty()) first_range_ = row.t;
+    newest_any_range_ = row.t;
+    const bool gap = state_.initialized && seconds(before, row.t) > config_.start_window;
+    if (gap) stop();
+    // A start takes all that has one stamp: the first range behind it tells that it is complete.
+    if (before != kNever && row.t > before) try_start(before);
     run_updates(row.t);
     push(row);
     if (row.kind == Row::Kind::kRange) remember(row);
-    if (!state_.initialized) try_start(row.t);
     return gap ? Status::kGap : Status::kOk;
   }
 
@@ -279,12 +286,27 @@ class RangingEstimator {
   }
 
   void remember(const Row& row) {
-    const Nanoseconds oldest = row.t - nanoseconds(config_.start_window);
-    recent_.erase(
-        std::remove_if(recent_.begin(), recent_.end(), [&](const Row& r) { return r.t < oldest; }),
-        recent_.end());
+    forget(row.t);
+    if (recent_.empty()) first_range_ = row.t;
     if (recent_.size() == std::size_t(kRecent)) recent_.erase(recent_.begin());
     recent_.push_back(row);
+  }
+
+  // Ranges that are not of the last `start_window` before t.
+  void forget(Nanoseconds t) {
+    const auto old = [&](const Row& r) {
+      const Scalar age = seconds(r.t, t);
+      return age > config_.start_window || age < 0;
+    };
+    recent_.erase(std::remove_if(recent_.begin(), recent_.end(), old), recent_.end());
+  }
+
+  // Waits for a new start: what the robot did meanwhile is unknown.
+  void stop() {
+    ++state_.health.gaps;
+    state_.initialized = false;
+    pending_.clear();
+    recent_.clear();
   }
 
   // Near the vertical the cosine changes with the square of the angle.
@@ -303,10 +325,13 @@ class RangingEstimator {
 
   // All automatic updates that nothing will come for any more.
   void run_updates(Nanoseconds t) {
-    now_ = std::max(now_, t);
     if (!state_.initialized) return;
+    if (seconds(state_.t, t) > kLongestAbsence) {
+      stop();
+      return;
+    }
     const Nanoseconds latency = nanoseconds(config_.max_latency);
-    while (state_.initialized && next_ + latency < now_) step(next_);
+    while (state_.initialized && next_ + latency < t) step(next_);
   }
 
   void step(Nanoseconds t) {
@@ -343,9 +368,11 @@ class RangingEstimator {
       return dynamics_.step(points, rest_lengths_, dt / Scalar(steps), steps) == Status::kOk;
     };
     if (filter_.predict(process, noise_) != Status::kOk) ++state_.health.failed_predictions;
+    if (config_.hold_rods) hold_rods();
   }
 
-  // Moves what is stamped up to t from the pending measurements to the rows.
+  // Moves what is stamped up to t from the pending measurements to the rows, and adds what the
+  // AHRSs say: they are ahead of the update by the latency.
   void collect_rows(Nanoseconds t) {
     rows_.clear();
     std::size_t kept = 0;
@@ -362,7 +389,7 @@ class RangingEstimator {
     for (int r = 0; r < int(model_.robot().rods.size()); ++r) {
       for (const int node : model_.robot().rods[std::size_t(r)]) {
         Imu& imu = imus_[std::size_t(node)];
-        if (!imu.fresh || imu.t > t || rows_.size() >= std::size_t(kRows)) continue;
+        if (!imu.fresh || rows_.size() >= std::size_t(kRows)) continue;
         rows_.push_back(inclination_row(imu.t, r, imu.ahrs.inclination_cosine()));
         rows_.back().ahead = seconds(t, imu.t);
         rows_.back().second = node;
@@ -379,16 +406,14 @@ class RangingEstimator {
       const Scalar std = rows_[std::size_t(r)].std;
       variances_[r] = std * std;
     }
-    scratch_ = filter_.mean();
     const Scalar gate =
         config_.gate > 0 ? config_.gate * config_.gate : std::numeric_limits<Scalar>::infinity();
     const auto measure = [&](const ConstMatrixRef<Scalar>& points, MatrixRef<Scalar> predicted) {
       model_(points, predicted, rows_);
     };
-    const Status status =
-        filter_.correct(measure, values_.head(count), variances_.head(count), gate);
+    filter_.correct(measure, values_.head(count), variances_.head(count), gate);
     count_rows();
-    if (status == Status::kOk && config_.hold_rods) hold_rods();
+    if (config_.hold_rods) hold_rods();
   }
 
   void count_rows() {
@@ -422,65 +447,54 @@ class RangingEstimator {
     if (imu.ahrs.start(imu.accel) == Status::kOk) imu.rejected = 0;
   }
 
-  // A linear correction that turns a rod by an angle stretches it by the square of it; at 1e5 N/m
-  // that would be a blow. Rods keep their middle, direction and length, and the stretching that
-  // they had before.
+  // Positions that are uncertain by a rotation have a mean with shorter rods, a linear correction
+  // that turns a rod stretches it; at 1e5 N/m either would be a blow. Rods of the mean keep their
+  // middle and direction and get their length back; their ends do not move along them.
   void hold_rods() {
-    auto& x = scratch_;
+    scratch_ = filter_.mean();
     const int v = 3 * nodes_;
     for (const auto& rod : model_.robot().rods) {
-      const int a = 3 * rod[0], b = 3 * rod[1];
-      const V3 before = x.template segment<3>(b) - x.template segment<3>(a);
-      const V3 speed_before = x.template segment<3>(v + b) - x.template segment<3>(v + a);
-      const V3 d = filter_.mean().template segment<3>(b) - filter_.mean().template segment<3>(a);
-      const V3 speed =
-          filter_.mean().template segment<3>(v + b) - filter_.mean().template segment<3>(v + a);
-      const V3 axis = d.normalized();
-      const V3 longer = (before.norm() - d.norm()) / 2 * axis;
-      const V3 faster = (speed_before.dot(before.normalized()) - speed.dot(axis)) / 2 * axis;
-      x.template segment<3>(a) = filter_.mean().template segment<3>(a) - longer;
-      x.template segment<3>(b) = filter_.mean().template segment<3>(b) + longer;
-      x.template segment<3>(v + a) = filter_.mean().template segment<3>(v + a) - faster;
-      x.template segment<3>(v + b) = filter_.mean().template segment<3>(v + b) + faster;
+      auto x0 = scratch_.template segment<3>(3 * rod[0]);
+      auto x1 = scratch_.template segment<3>(3 * rod[1]);
+      auto v0 = scratch_.template segment<3>(v + 3 * rod[0]);
+      auto v1 = scratch_.template segment<3>(v + 3 * rod[1]);
+      const V3 d = x1 - x0, axis = d.normalized();
+      const V3 longer = (model_.robot().rod_length - d.norm()) / 2 * axis;
+      const V3 faster = -axis.dot(v1 - v0) / 2 * axis;
+      x0 -= longer;
+      x1 += longer;
+      v0 -= faster;
+      v1 += faster;
     }
-    filter_.move(x);
+    filter_.move(scratch_);
   }
 
-  // The same for sigma points: displacements across a rod stretch it to second order. Every rod
-  // gets the length and the speed of stretching that it has in the mean.
+  // The same for sigma points: displacements across a rod stretch it to second order.
   void hold_rods_of(MatrixRef<Scalar> points) const {
     const int v = 3 * nodes_;
+    const Scalar length = model_.robot().rod_length;
     const Eigen::Index count = points.rows();
     for (const auto& rod : model_.robot().rods) {
       const int a = 3 * rod[0], b = 3 * rod[1];
-      const V3 mean = filter_.mean().template segment<3>(b) - filter_.mean().template segment<3>(a);
-      const Scalar length = mean.norm();
-      const Scalar speed =
-          (filter_.mean().template segment<3>(v + b) - filter_.mean().template segment<3>(v + a))
-              .dot(mean) /
-          length;
-      Scalar* x[2][3];
-      Scalar* w[2][3];
+      Scalar *x0[3], *x1[3], *v0[3], *v1[3];
       for (int k = 0; k < 3; ++k) {
-        x[0][k] = &points(0, a + k);
-        x[1][k] = &points(0, b + k);
-        w[0][k] = &points(0, v + a + k);
-        w[1][k] = &points(0, v + b + k);
+        x0[k] = &points(0, a + k);
+        x1[k] = &points(0, b + k);
+        v0[k] = &points(0, v + a + k);
+        v1[k] = &points(0, v + b + k);
       }
       for (Eigen::Index s = 0; s < count; ++s) {
-        const Scalar dx = x[1][0][s] - x[0][0][s], dy = x[1][1][s] - x[0][1][s],
-                     dz = x[1][2][s] - x[0][2][s];
-        const Scalar inverse = 1 / std::sqrt(dx * dx + dy * dy + dz * dz);
-        const Scalar ux = dx * inverse, uy = dy * inverse, uz = dz * inverse;
-        const Scalar stretching = (w[1][0][s] - w[0][0][s]) * ux + (w[1][1][s] - w[0][1][s]) * uy +
-                                  (w[1][2][s] - w[0][2][s]) * uz;
-        const Scalar longer = (length - 1 / inverse) / 2, faster = (speed - stretching) / 2;
-        const Scalar u[3] = {ux, uy, uz};
+        const Scalar dx = x1[0][s] - x0[0][s], dy = x1[1][s] - x0[1][s], dz = x1[2][s] - x0[2][s];
+        const Scalar norm = std::sqrt(dx * dx + dy * dy + dz * dz);
+        const Scalar axis[3] = {dx / norm, dy / norm, dz / norm};
+        const Scalar longer = (length - norm) / 2;
+        Scalar faster = 0;
+        for (int k = 0; k < 3; ++k) faster -= axis[k] * (v1[k][s] - v0[k][s]) / 2;
         for (int k = 0; k < 3; ++k) {
-          x[0][k][s] -= longer * u[k];
-          x[1][k][s] += longer * u[k];
-          w[0][k][s] -= faster * u[k];
-          w[1][k][s] += faster * u[k];
+          x0[k][s] -= longer * axis[k];
+          x1[k][s] += longer * axis[k];
+          v0[k][s] -= faster * axis[k];
+          v1[k][s] += faster * axis[k];
         }
       }
     }
@@ -489,7 +503,9 @@ class RangingEstimator {
   // ---- start
 
   void try_start(Nanoseconds t) {
-    if (state_.initialized || recent_.empty()) return;
+    if (state_.initialized) return;
+    forget(t);
+    if (recent_.empty()) return;
     if (seconds(first_range_, t) < config_.start_window - Scalar(1e-6)) return;
     if (gather(t) < config_.start_pairs) return;
     const RigidPose<Scalar> pose = search_.best(distances_, inclinations_);
@@ -509,12 +525,13 @@ class RangingEstimator {
     ++state_.health.restarts;
     state_.initialized = false;
     pending_.clear();
-    if (!recent_.empty()) try_start(t);
+    try_start(t);
   }
 
   // Searches a pose for the latest ranges, and takes it if it explains them clearly better.
   void restart(Nanoseconds t) {
     last_start_ = t;
+    forget(t);
     if (gather(t) < config_.start_pairs) return;
     const RigidPose<Scalar> pose = search_.best(distances_, inclinations_);
     const auto module = [&](int i) { return model_.module(state_.positions, i); };
@@ -631,7 +648,7 @@ class RangingEstimator {
   UnscentedFilter<Scalar> filter_;
   PoseSearch<Scalar> search_;
   VectorX<Scalar> rest_lengths_;
-  MatrixX<Scalar> noise_, density_;
+  MatrixX<Scalar> noise_;
   VectorX<Scalar> scratch_, values_, variances_;
   std::vector<Row> pending_, rows_, recent_;
   std::vector<PointDistance<Scalar>> distances_;
@@ -640,7 +657,7 @@ class RangingEstimator {
   std::vector<Imu> imus_;
   std::vector<int> pair_count_;
   Nanoseconds newest_motors_ = kNever, newest_any_range_ = kNever;
-  Nanoseconds now_ = kNever, next_ = 0, last_start_ = 0;
+  Nanoseconds next_ = 0, last_start_ = 0;
   Nanoseconds first_range_ = 0;  // since when ranges have come without a gap
   int imu_rows_ = 0;             // the first row that an IMU of ours gave
   RangingState<Scalar> state_;
