@@ -36,7 +36,7 @@ from tensegrity.ranging.calibration_files import read_calibration, write_calibra
 from tensegrity.ranging.calibration_frame import RigidMotion, align, survey_frame
 from tensegrity.ranging.calibration_model import CalibrationModel
 from tensegrity.ranging.calibration_start import closed_form
-from tensegrity.ranging.multilateration import Whereabouts, locate
+from tensegrity.ranging.multilateration import locate
 from tensegrity.ranging.prediction import prediction_errors
 
 FloatArray = NDArray[np.float64]
@@ -217,13 +217,13 @@ class TestGeometry:
         found, _ = locate(ANCHORS.position_m, distances, at + 0.7, 0.1)
         np.testing.assert_allclose(found, at, atol=0.01)
 
-    def test_whereabouts_decide_between_mirror_images(self) -> None:
-        flat = ANCHORS.position_m * [1, 1, 0]
-        at = np.array([[3.0, 4.0, 1.0]])
-        distances = np.linalg.norm(at[:, None] - flat, axis=2)
-        above = Whereabouts(np.array([4.0, 4.0, 1.0]), np.diag([25.0, 25.0, 0.25]))
-        found, _ = locate(flat, distances, np.array([[4.0, 4.0, 0.2]]), 0.1, above)
-        np.testing.assert_allclose(found, at, atol=0.05)
+    def test_locate_without_enough_ranges_stays_finite(self) -> None:
+        distances = np.full((2, 6), np.nan)
+        distances[1, :2] = 5.0
+        start = np.array([[1.0, 2.0, 3.0], [4.0, 4.0, 1.0]])
+        found, _ = locate(ANCHORS.position_m, distances, start, 0.1)
+        np.testing.assert_allclose(found[0], start[0])
+        assert np.isfinite(found).all()
 
     @pytest.mark.parametrize("mirrored", [False, True])
     def test_a_partial_survey_fixes_the_frame(self, mirrored: bool) -> None:
@@ -413,6 +413,13 @@ class TestUncertainty:
         result = calibrate_ranges(recording.where(kept), None, MODEL)
         assert not result.rich_enough
         assert "anchor 13 is not determined" in result.verdict
+
+    def test_rival_constellations_are_told(self, shared_data: Path) -> None:
+        """Four anchors and a robot that hardly moves: seeds disagree, and the verdict says so."""
+        recording = read_ranges(shared_data / "superball" / "rolling_indoor")
+        result = calibrate_ranges(recording, None)
+        assert not result.rich_enough
+        assert "another constellation fits about as well" in result.verdict
 
 
 class TestBadInput:

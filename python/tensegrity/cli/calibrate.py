@@ -51,6 +51,12 @@ def calibrate(
     rod_length_std: Annotated[
         float, typer.Option(help="Its standard deviation [m].")
     ] = _DEFAULT.rod_length_std,
+    offset: Annotated[
+        float, typer.Option(help="Expected offset of the ranges [m].")
+    ] = _DEFAULT.offset_m,
+    offset_std: Annotated[
+        float, typer.Option(help="Its standard deviation [m].")
+    ] = _DEFAULT.offset_std,
     start: Annotated[
         float | None,
         typer.Option(help="Use ranges from this time on [s].", show_default="all"),
@@ -70,6 +76,7 @@ def calibrate(
         ("loss-scale", loss_scale),
         ("rod-length", rod_length),
         ("rod-length-std", rod_length_std),
+        ("offset-std", offset_std),
     ):
         if not 0 < value <= 100:
             raise InputError(f"expected a length in (0, 100] [m], got {value:g}", field=name)
@@ -87,6 +94,8 @@ def calibrate(
         loss_scale=loss_scale / _DEFAULT.range_std,
         rod_length=rod_length,
         rod_length_std=rod_length_std,
+        offset_m=offset,
+        offset_std=offset_std,
     )
     with progress_bar("calibrating") as progress:
         result = calibrate_ranges(

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tensegrity.errors import InputError
 from tensegrity.ranging import calibration_bfgs, calibration_lm
 from tensegrity.ranging.calibration_checks import check
-from tensegrity.ranging.calibration_covariance import complaints
+from tensegrity.ranging.calibration_covariance import POOR_STD_M, complaints
 from tensegrity.ranging.calibration_internal import internal_offsets
 from tensegrity.ranging.calibration_model import CalibrationModel
 from tensegrity.ranging.calibration_solution import Residuals, Solution
@@ -193,6 +193,12 @@ def _warnings(solution: Solution, survey: Anchors, covariance: FloatArray) -> li
     found = [] if np.isnan(covariance).any() else complaints(survey.ids, covariance)
     if not solution.converged:
         found.append(f"the solution did not converge in {solution.iterations} iterations")
+    if solution.rival_m > POOR_STD_M:
+        found.append(
+            "another constellation fits about as well, with anchors up to "
+            f"{solution.rival_m:.2g} m elsewhere: survey some of them, or move the "
+            "robot through a larger area"
+        )
     off = float(np.mean(np.abs(solution.residuals.residual_m) > _OUTLIER_M))
     if off > _MOST_OUTLIERS:
         found.append(f"{100 * off:.0f} % of the ranges do not fit within {_OUTLIER_M:g} m")

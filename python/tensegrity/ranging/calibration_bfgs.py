@@ -172,6 +172,7 @@ def solve(
         rod_lengths_m=np.empty(0),
         covariance=np.full((size, size), np.nan),
         free_motions=(),
+        rival_m=0.0,
         knot_t=times,
         modules=modules,
         residuals=Residuals(

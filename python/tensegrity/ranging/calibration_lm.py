@@ -82,6 +82,8 @@ def solve(
         rod_lengths_m=rod_lengths,
         covariance=determination.covariance,
         free_motions=determination.free_motions,
+        # Among rivals a survey decides; they are told apart without it only.
+        rival_m=0.0 if survey.known.any() else guess.rival_m,
         knot_t=strips.knot_t,
         modules=positions_of(solver, strips),
         residuals=Residuals(

@@ -52,8 +52,8 @@ class CalibrationModel:
     survey_std: float = 0.05
     knot_s: float = 0.4
     diffusion: float = 0.1
-    offset_m: float = 3.9
-    offset_std: float = 0.5
+    offset_m: float = 3.95
+    offset_std: float = 0.15
     module_std: float = 0.05
     pair_std: float = 0.05
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tensegrity.ranging.calibration_frame import align
 from tensegrity.ranging.calibration_model import (
     ANYWHERE_M,
     CalibrationModel,
@@ -38,6 +39,7 @@ _WANDER_STD_M = 0.1  # of modules in the plane about the start
 # the modules' heights about the plane [m].
 _COARSE = (10.0, 0.5, 0.5)
 _MIDDLE = (3.0, 0.2, ANYWHERE_M)
+_RIVAL_COST = 1.1  # relative to the best: what noise alone may explain
 _ITERATIONS = 40
 _TOLERANCE = 1e-3
 
@@ -45,8 +47,10 @@ _TOLERANCE = 1e-3
 @dataclass(frozen=True)
 class Guess:
     """``anchors_m`` (A, 3) and the modules' positions (K, 3) at ``knot_t`` [m], the common
-    ``offset_m`` and the ``rod_lengths_m`` in the order of the recording's rods [m]; ``cost`` is
-    comparable among guesses of one recording."""
+    ``offset_m`` and the ``rod_lengths_m`` in the order of the recording's rods [m].
+
+    ``cost`` is comparable among guesses of one recording; ``rival_m`` is how far an anchor of
+    another guess that fits about as well is from this one [m], after alignment."""
 
     anchors_m: FloatArray
     offset_m: float
@@ -54,6 +58,7 @@ class Guess:
     knot_t: FloatArray
     modules_m: dict[int, FloatArray]
     cost: float
+    rival_m: float = 0.0
 
 
 def search(
@@ -81,7 +86,7 @@ def search(
         for _, rod_std, height_std in (_COARSE, _MIDDLE)
     )
     loss = coarse.core_loss
-    best: Guess | None = None
+    guesses: list[Guess] = []
     for attempt in range(attempts):
         start = find_start(ranges, model.offset_m, rng)
         rods = len(first.shared) - 3 * len(unknown) - len(terms)
@@ -94,14 +99,25 @@ def search(
         second.shared = first.shared
         set_positions(second, strips, positions_of(first, strips))
         _, _, cost = second.solve(loss, _MIDDLE[0], _ITERATIONS, _TOLERANCE)
-        if best is None or cost < best.cost:
-            found, offset, lengths = shared_parts(second.shared, len(unknown), len(terms))
-            modules = positions_of(second, strips)
-            best = Guess(found, float(offset[0]), lengths, strips.knot_t, modules, cost)
+        found, offset, lengths = shared_parts(second.shared, len(unknown), len(terms))
+        modules = positions_of(second, strips)
+        guesses.append(Guess(found, float(offset[0]), lengths, strips.knot_t, modules, cost))
         progress((attempt + 1) / attempts)
-    if best is None:
+    if not guesses:
         raise ValueError("attempts: expected at least 1")
-    return best
+    best = min(guesses, key=lambda guess: guess.cost)
+    rivals = [
+        float(np.linalg.norm(_differences(guess, best), axis=1).max())
+        for guess in guesses
+        if guess.cost < _RIVAL_COST * best.cost
+    ]
+    return replace(best, rival_m=max(rivals))
+
+
+def _differences(guess: Guess, other: Guess) -> FloatArray:
+    """Differences (A, 3) [m] of the anchors of two guesses after the best alignment."""
+    moved = align(guess.anchors_m, other.anchors_m)(guess.anchors_m)
+    return moved - other.anchors_m
 
 
 def _with_heights(start: Start, rng: np.random.Generator) -> FloatArray:

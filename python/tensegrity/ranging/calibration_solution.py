@@ -32,6 +32,7 @@ class Solution:
       and the distances ``rod_lengths_m`` between their modules [m]
     * ``covariance`` (P, P) of all these in this order [m^2], NaN where it is not known
     * ``free_motions`` of the whole that nothing holds, in words
+    * ``rival_m``: how far the anchors of another solution that fits about as well are off [m]
     * ``knot_t`` (K,) and positions (K, 3) of the ``modules`` by number [m]
     * ``residuals`` of the ranges
     """
@@ -43,6 +44,7 @@ class Solution:
     rod_lengths_m: FloatArray
     covariance: FloatArray
     free_motions: tuple[str, ...]
+    rival_m: float
     knot_t: FloatArray
     modules: dict[int, FloatArray]
     residuals: Residuals

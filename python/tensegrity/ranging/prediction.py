@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tensegrity.errors import InputError
-from tensegrity.ranging.multilateration import Whereabouts, locate_either_side, plane_normal
+from tensegrity.ranging.multilateration import locate_either_side, plane_normal
 from tensegrity.ranging.recording import Anchors, Offsets, RangeRecording
 
 FloatArray = NDArray[np.float64]
@@ -22,7 +22,6 @@ def prediction_errors(
     recording: RangeRecording,
     anchors: Anchors,
     offsets: Offsets,
-    whereabouts: Whereabouts | None = None,
     other_anchors_only: bool = False,
     window_s: float = WINDOW_S,
     least_others: int = LEAST_OTHERS,
@@ -54,9 +53,9 @@ def prediction_errors(
     for row, (_, others) in enumerate(used):
         seen_m[row, : len(others)] = distance[others]
         seen_from[row, : len(others)] = anchors.position_m[anchor[others]]
-    middle = anchors.position_m.mean(axis=0) if whereabouts is None else whereabouts.mean_m
+    middle = anchors.position_m.mean(axis=0)
     position = locate_either_side(
-        seen_from, seen_m, middle, plane_normal(anchors.position_m), _LOSS_SCALE_M, whereabouts
+        seen_from, seen_m, middle, plane_normal(anchors.position_m), _LOSS_SCALE_M
     )
     rows = np.array([i for i, _ in used])
     predicted = np.linalg.norm(position - anchors.position_m[anchor[rows]], axis=1)
