@@ -120,6 +120,16 @@ class TestFiles:
         write_ranges(tmp_path / "again.csv", recording)
         assert (tmp_path / "again.csv").read_text().startswith("step,")
 
+    def test_a_stretch_of_time_or_steps(self, recording: RangeRecording) -> None:
+        part = recording.between(10.0, 20.0)
+        assert (part.t_ns >= 10 * 10**9).all()
+        assert (part.t_ns < 20 * 10**9).all()
+        assert len(part) + len(recording.between(0, 10)) == len(recording.between(0, 20))
+        steps = replace(recording, t_ns=np.arange(len(recording)), timed=False)
+        np.testing.assert_array_equal(steps.between(3, 6).t_ns, [3, 4, 5])
+        with pytest.raises(InputError, match="no ranges from 50 up to 60"):
+            recording.between(50.0, 60.0)
+
     def test_unknown_coordinates_stay_unknown(self, tmp_path: Path) -> None:
         position = np.array([[1.0, 2.0, np.nan], [np.nan, np.nan, np.nan]])
         write_anchors(tmp_path / "anchors.csv", Anchors(np.array([13, 14]), position))

@@ -59,10 +59,11 @@ def calibrate(
     ] = _DEFAULT.offset_std,
     start: Annotated[
         float | None,
-        typer.Option(help="Use ranges from this time on [s].", show_default="all"),
+        typer.Option(help="Use ranges from this time (or step) on [s].", show_default="all"),
     ] = None,
     end: Annotated[
-        float | None, typer.Option(help="Use ranges before this time [s].", show_default="all")
+        float | None,
+        typer.Option(help="Use ranges before this time (or step) [s].", show_default="all"),
     ] = None,
     attempts: Annotated[int, typer.Option(min=1, help="Starts to refine.")] = ATTEMPTS,
     seed: Annotated[int, typer.Option(help="Of the starts.")] = 0,

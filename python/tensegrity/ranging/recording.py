@@ -122,9 +122,19 @@ class RangeRecording:
         )
 
     def between(self, start_s: float, end_s: float) -> RangeRecording:
-        """Ranges stamped from ``start_s`` up to but without ``end_s`` [s]."""
-        seconds = self.t_ns * 1e-9
-        return self.where((start_s <= seconds) & (seconds < end_s))
+        """Ranges stamped from ``start_s`` up to but without ``end_s`` [s], or steps when not
+        ``timed``.
+
+        Raises :class:`InputError` when there are none.
+        """
+        stamps = self.t_ns * (1e-9 if self.timed else 1.0)
+        inside = (start_s <= stamps) & (stamps < end_s)
+        if not inside.any():
+            raise InputError(
+                f"'{self.name}' holds no ranges from {start_s:g} up to {end_s:g}",
+                hint=f"it goes from {stamps[0]:g} to {stamps[-1]:g}",
+            )
+        return self.where(inside)
 
 
 @dataclass(frozen=True)
