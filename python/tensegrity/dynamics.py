@@ -153,14 +153,14 @@ def relax(
 ) -> FloatArray:
     """Positions (n, 3) [m] where the net comes to rest, no node pulled by ``force_tolerance`` [N].
 
-    It starts at ``start`` (n, 3), by default as described; with ``gravity``, on the ground.
+    It starts at ``start`` (n, 3), by default as described, and with ``gravity`` falls to the ground
+    from there: :meth:`Net.standing_on` puts it on a face.
     Whenever its kinetic energy has passed a peak it is stopped ("kinetic damping"), which ends in
     an equilibrium in much fewer steps than its own damping would.
 
     Raises :class:`InputError` when it does not come to rest.
     """
     lengths = net.rest_lengths() if rest_lengths is None else np.asarray(rest_lengths)
-    # Accelerations from rest are read off one step; its length only limits how finely.
     dt = stable_step(net, "semi_implicit_euler") / 2
     simulator = Simulator(net, gravity=GRAVITY if gravity else (0.0, 0.0, 0.0), ground=gravity)
     state = at_rest(net.undeformed_positions() if start is None else start)
@@ -175,6 +175,7 @@ def relax(
             continue
         state[half:] = 0.0
         peak = 0.0
+        # One step from rest gains velocity in proportion to the force.
         moved = simulator.step(state, lengths, dt, 1, "semi_implicit_euler", anchors=anchors.copy())
         forces = net.node_mass * moved[half:].reshape(-1, 3) / dt
         if np.linalg.norm(forces, axis=1).max() < force_tolerance:

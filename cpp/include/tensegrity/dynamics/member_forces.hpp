@@ -11,7 +11,7 @@ namespace tensegrity::dynamics {
 template <typename Scalar>
 struct MemberConstants {
   Eigen::Index from;    // first coordinate of the node
-  Eigen::Index to;      //
+  Eigen::Index to;      // and of the other one
   Scalar stiffness;     // K [N/m]
   Scalar damping;       // c [N s/m]
   Scalar rest_tension;  // K L0 [N]
@@ -24,8 +24,8 @@ enum class Pushes { kYes, kNo };
 // The force density (C §IV-A)
 //   q = K (1 - L0 / L) + (c / L) dL/dt,   dL/dt = U . V / L
 // times the vector U = to - from pulls `from` toward `to`. (The paper prints the damping with the
-// opposite sign, which would feed energy into the net.) A
-// cable has no force while it is slack, and its damping never makes it push.
+// opposite sign, which would feed energy into the net.) A cable has no force while it is slack, and
+// its damping never makes it push.
 template <typename Scalar, Pushes pushes>
 inline void add_member_force(const MemberConstants<Scalar>& m,
                              const typename Lanes<Scalar>::Vector* position,
