@@ -153,8 +153,8 @@ def relax(
 ) -> FloatArray:
     """Positions (n, 3) [m] where the net comes to rest, no node pulled by ``force_tolerance`` [N].
 
-    It starts at ``start`` (n, 3), by default as described, and with ``gravity`` falls to the ground
-    from there: :meth:`Net.standing_on` puts it on a face.
+    It starts at ``start`` (n, 3), by default as described. With ``gravity`` it comes to rest on the
+    ground, which it touches at the start by default; :meth:`Net.standing_on` puts it on a face.
     Whenever its kinetic energy has passed a peak it is stopped ("kinetic damping"), which ends in
     an equilibrium in much fewer steps than its own damping would.
 
@@ -163,7 +163,11 @@ def relax(
     lengths = net.rest_lengths() if rest_lengths is None else np.asarray(rest_lengths)
     dt = stable_step(net, "semi_implicit_euler") / 2
     simulator = Simulator(net, gravity=GRAVITY if gravity else (0.0, 0.0, 0.0), ground=gravity)
-    state = at_rest(net.undeformed_positions() if start is None else start)
+    if start is None:
+        start = net.undeformed_positions()
+        if gravity:
+            start[:, 2] -= start[:, 2].min()
+    state = at_rest(start)
     anchors = anchors_under(state)
     half = state.size // 2
     peak = 0.0

@@ -207,6 +207,13 @@ def test_relaxed_superball_keeps_its_symmetry_and_is_in_equilibrium(superball: N
     )
 
 
+def test_relaxed_on_the_ground_its_weight_is_carried(prism: Net) -> None:
+    for net in (prism, robots.load_net("superball")):
+        x = relax(net, gravity=True)
+        carried = net.ground.stiffness * np.maximum(0.0, -x[:, 2])
+        assert carried.sum() == pytest.approx(len(net.nodes) * net.node_mass * 9.81, rel=1e-6)
+
+
 def test_relaxed_prism_is_in_equilibrium(prism: Net) -> None:
     x = relax(prism)
     assert np.abs(right_side(prism, at_rest(x))[x.size :]).max() * prism.node_mass < 1e-6
