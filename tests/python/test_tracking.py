@@ -8,7 +8,7 @@ import pytest
 
 from tensegrity import robots, tracking
 from tensegrity._core import RangingEstimator, Status
-from tensegrity.dynamics import core_net
+from tensegrity.dynamics import core_net, relax
 from tensegrity.errors import InputError
 from tensegrity.ranging.recording import (
     Anchors,
@@ -25,12 +25,13 @@ NET = robots.load_net("superball")
 POSITIONS = np.array([[5.0, 4.0, 0.4], [-5.0, 4.0, 2.5], [-5.0, -4.0, 0.5], [5.0, -4.0, 3.0]])
 ANCHOR_IDS = np.array([13, 14, 15, 16])
 FACE = (6, 8, 9)
+AT_REST = relax(NET, start=NET.standing_on(FACE), gravity=True) + np.array([1.0, -0.5, 0.0])
 
 
 def at_rest(seconds: float = 3.0, seed: int = 1) -> RangingSequence:
     """The robot stands on FACE; every module ranges half of the anchors at 10 Hz."""
     random = np.random.default_rng(seed)
-    nodes = NET.standing_on(FACE) + np.array([1.0, -0.5, 0.0])
+    nodes = AT_REST
     modules = NET.module_positions(nodes)
     rows = [
         (step * 100_000_000, node, anchor, i, k)
@@ -67,12 +68,11 @@ def test_finds_a_robot_at_rest_and_the_face_that_is_down(sequence: RangingSequen
     result = track(sequence)
     assert sequence.endcaps is not None
     errors = track_errors(result, sequence.endcaps)
-    assert errors.centre_of_mass_rmse < 0.05
-    assert errors.node_rmse < 0.1
+    assert errors.centre_of_mass_rmse < 0.1
+    assert errors.node_rmse < 0.15
     assert errors.face_right[len(result) // 2 :].all()
     assert set(result.faces[-1]) == set(FACE)
-    # Ranges are better than their offsets are trusted to be: the covariance must not be smaller
-    # than the errors.
+    # Offsets are exact, and not trusted to be: the covariance must not be smaller than the errors.
     assert np.mean(errors.nees) < 3
     assert result.health.restarts == 0
     assert np.diff(result.t_ns) == pytest.approx(1e8)
@@ -81,7 +81,7 @@ def test_finds_a_robot_at_rest_and_the_face_that_is_down(sequence: RangingSequen
 
 
 def test_uses_every_sensor_that_there_is(sequence: RangingSequence) -> None:
-    nodes = NET.standing_on(FACE) + np.array([1.0, -0.5, 0.0])
+    nodes = AT_REST
     t_ns = np.arange(0, 3_000_000_000, 20_000_000)
     imus = {}
     for a, b in NET.rod_ends():
