@@ -167,12 +167,10 @@ class CalibrationStripSolver {
         const Scalar* link = &link_[kSize * kSize * (k - 1)];
         const Scalar* before = rows - kSize * columns;
         for (int i = 0; i < kSize; ++i) {
-          for (int m = 0; m < kSize; ++m) {
-            for (int j = 0; j < kSize; ++j) {
-              factor[kSize * i + j] -= link[kSize * m + i] * link[kSize * m + j];
-            }
-            subtract(link[kSize * m + i], before + columns * m, columns, rows + columns * i);
-          }
+          Scalar weights[kSize];
+          for (int m = 0; m < kSize; ++m) weights[m] = link[kSize * m + i];
+          subtract_rows(weights, link, kSize, kSize, factor + kSize * i);
+          subtract_rows(weights, before, columns, columns, rows + columns * i);
         }
       }
       if (!cholesky(factor)) return false;
@@ -181,10 +179,9 @@ class CalibrationStripSolver {
       forward(factor, link, kSize);
       forward(factor, rows, columns);
       for (int j = 0; j < columns; ++j) {
-        Scalar* out = &reduced_[columns * j];
-        for (int m = 0; m < kSize; ++m) {
-          subtract(rows[columns * m + j], rows + columns * m, j + 1, out);
-        }
+        Scalar weights[kSize];
+        for (int m = 0; m < kSize; ++m) weights[m] = rows[columns * m + j];
+        subtract_rows(weights, rows, columns, j + 1, &reduced_[columns * j]);
       }
     }
     for (int j = 0; j < width_; ++j) {
@@ -359,6 +356,16 @@ class CalibrationStripSolver {
     }
     shared_gradient_[rod_column_] -= information * error;
     shared_information_[rod_column_ * width_ + rod_column_] += information;
+  }
+
+  // out -= sum of weights[m] * row m, the first `count` numbers of rows that are `columns` long
+  static void subtract_rows(const Scalar* weights, const Scalar* rows, int columns, int count,
+                            Scalar* out) {
+    for (int j = 0; j < count; ++j) {
+      Scalar sum = 0;
+      for (int m = 0; m < kSize; ++m) sum += weights[m] * rows[columns * m + j];
+      out[j] -= sum;
+    }
   }
 
   // out -= factor * row
