@@ -263,6 +263,8 @@ void bind_ranging_estimator(py::module_& m) {
       .def_readwrite("hold_rods", &Config::hold_rods,
                      "sigma points and corrections never stretch rods")
       .def_readwrite("gate", &Config::gate, "largest innovation [standard deviations]; 0: none")
+      .def_readwrite("largest_rate", &Config::largest_rate,
+                     "of an IMU; faster is a wrong sample [rad/s]")
       .def_readwrite("start_window", &Config::start_window, "[s]")
       .def_readwrite("start_pairs", &Config::start_pairs, "pairs of modules that a start needs")
       .def_readwrite("start_ground_std", &Config::start_ground_std,
@@ -280,6 +282,7 @@ void bind_ranging_estimator(py::module_& m) {
       .def_readonly("ranges_rejected", &Health::ranges_rejected, "by the gate")
       .def_readonly("inclinations_used", &Health::inclinations_used)
       .def_readonly("inclinations_rejected", &Health::inclinations_rejected, "by the gate")
+      .def_readonly("imu_rejected", &Health::imu_rejected, "samples of impossible rates")
       .def_readonly("dropped", &Health::dropped, "wrong stamp, index or value")
       .def_readonly("gaps", &Health::gaps, "times without ranges")
       .def_readonly("failed_predictions", &Health::failed_predictions)

@@ -181,6 +181,9 @@ TEST_CASE("stamps that repeat, come late or from elsewhere are dropped") {
   CHECK(e.motors(t + 6, VectorX<double>::Ones(24)) == Status::kDuplicate);
   CHECK(e.imu(t + 6, -1, {0, 0, 0}, {0, 0, 9.81}) == Status::kOutOfRange);
   CHECK(e.imu(t + 6, 0, {0, 0, 0}, {0, 0, std::nan("")}) == Status::kNotFinite);
+  CHECK(e.imu(t + 6, 1, {0, 35, 0}, {0, 0, 9.81}) == Status::kOutOfRange);
+  CHECK(e.imu(t + 7, 1, {0, 1, 0}, {0, 0, 9.81}) == Status::kOk);
+  CHECK(e.state().health.imu_rejected == 1);
   CHECK(e.state().health.dropped == 16);
 
   // Two seconds of silence, then ranges again: a new start.

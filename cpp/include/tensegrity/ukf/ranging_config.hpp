@@ -61,6 +61,10 @@ struct RangingConfig {
   // innovations beyond so many standard deviations are left out; 0: none
   Scalar gate = Scalar(3.5);
 
+  // An IMU's rate beyond this is a wrong sample: the ends of a rod of 1.7 m would move at 17 m/s,
+  // as after a fall from 15 m [rad/s].
+  Scalar largest_rate = Scalar(20);
+
   // start, and restart of a lost filter
   Scalar start_window = Scalar(1);        // seconds of ranges that a pose is found from
   int start_pairs = 12;                   // different pairs of modules it needs

@@ -133,17 +133,21 @@ class RangingEstimator {
   }
 
   // A sample of the IMU at a node: rate [rad/s] and specific force [m/s^2], z along the rod toward
-  // its first end. The inclination of the rod comes from an AHRS of its own for each IMU.
+  // its first end. The inclination of the rod comes from an AHRS of its own for each IMU. A rate
+  // above `largest_rate` is kOutOfRange: the sample is left out and counted, the AHRS bridges it.
   Status imu(Nanoseconds t, int node, const V3& gyro, const V3& accel) {
     if (node < 0 || node >= nodes_) return drop(Status::kOutOfRange);
     Imu& imu = imus_[std::size_t(node)];
     Status status = check_stamp(t, imu.newest, true);
     if (status != Status::kOk) return drop(status);
-    const Nanoseconds before = imu.newest;
     imu.newest = t;
     run_updates(t);
-    status = imu.ahrs.started() && seconds(before, t) < kLongestImuGap
-                 ? imu.ahrs.update(gyro, accel, seconds(before, t))
+    if (gyro.allFinite() && gyro.norm() > config_.largest_rate) {
+      ++state_.health.imu_rejected;
+      return Status::kOutOfRange;
+    }
+    status = imu.ahrs.started() && seconds(imu.t, t) < kLongestImuGap
+                 ? imu.ahrs.update(gyro, accel, seconds(imu.t, t))
                  : imu.ahrs.start(accel);
     if (status != Status::kOk) return drop(status);
     imu.t = t;

@@ -15,6 +15,7 @@ struct RangingHealth {
   std::int64_t ranges_rejected = 0;  // by the gate, internal ones too
   std::int64_t inclinations_used = 0;
   std::int64_t inclinations_rejected = 0;  // by the gate
+  std::int64_t imu_rejected = 0;           // samples of impossible rates
   std::int64_t dropped = 0;                // input with a wrong stamp, index or value
   std::int64_t gaps = 0;                   // times without any range for `start_window`
   std::int64_t failed_predictions = 0;     // the dynamics gave numbers that are not finite
