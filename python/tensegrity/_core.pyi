@@ -1219,6 +1219,14 @@ class RangingConfig:
     def internal_range_std(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
+    def largest_rate(self) -> float:
+        """
+        of an IMU; faster is a wrong sample [rad/s]
+        """
+    @largest_rate.setter
+    def largest_rate(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
     def lost_level(self) -> float:
         """
         mean squared innovation in variances; 0: never lost
@@ -1346,6 +1354,11 @@ class RangingHealth:
     def gaps(self) -> int:
         """
         times without ranges
+        """
+    @property
+    def imu_rejected(self) -> int:
+        """
+        samples of impossible rates
         """
     @property
     def inclinations_rejected(self) -> int:
