@@ -1,7 +1,7 @@
 // The generic unscented filter with processes and measurements in Python, and the estimator of
 // ranging robots: sample by sample and over recordings at C++ speed.
 #include "bindings.hpp"
-#include "tensegrity/dynamics/simulator.hpp"
+#include "tensegrity/dynamics/single_precision.hpp"
 #include "tensegrity/ukf/ranging_estimator.hpp"
 
 namespace tensegrity::bindings {
@@ -57,7 +57,7 @@ std::vector<bool> accepted(const Filter& filter) {
 
 // ---- the estimator of ranging robots
 
-using Estimator = ukf::RangingEstimator<double, dynamics::Simulator<double>>;
+using Estimator = ukf::RangingEstimator<double, dynamics::SinglePrecision>;
 using Robot = ukf::RangingRobot<double>;
 using Anchors = ukf::RangingAnchors<double>;
 using Config = ukf::RangingConfig<double>;
@@ -105,7 +105,8 @@ Estimator estimator(const Robot& robot, const Anchors& anchors, const dynamics::
   if (anchors.internal_offsets.rows() != nodes || anchors.internal_offsets.cols() != nodes) {
     throw py::value_error("internal_offsets: expected (nodes, nodes)");
   }
-  return Estimator(robot, anchors, dynamics::Simulator<double>(net), rest_lengths, config);
+  const int points = 12 * net.nodes + 1;
+  return Estimator(robot, anchors, dynamics::SinglePrecision(net, points), rest_lengths, config);
 }
 
 // Arrays of one sensor, in the order of their stamps; empty: there was none.
