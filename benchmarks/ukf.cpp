@@ -1,6 +1,9 @@
-// Time of the unscented filter's algebra at SUPERball's size, 72 states and 30 measured rows, with
-// a process that does nothing: what is left of an update beside the dynamics.
+// Time and memory of the unscented filter's algebra for nets of 3 to 48 rods, 12 states and 5
+// measured rows a rod (SUPERball: 72 and 30), with a process that does nothing: what is left of an
+// update beside the dynamics (dynamics.cpp).
 #include "tensegrity/ukf/unscented_filter.hpp"
+
+#include <malloc.h>
 
 #include <algorithm>
 #include <chrono>
@@ -13,8 +16,8 @@ using namespace tensegrity::ukf;
 namespace {
 
 template <typename Scalar>
-void measure(const char* name, Form form) {
-  const int n = 72, m = 30, repetitions = 400;
+void measure(const char* name, Form form, int rods) {
+  const int n = 12 * rods, m = 5 * rods, repetitions = std::max(400 * 36 / (rods * rods), 5);
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   MatrixX<Scalar> a(n, n);
@@ -26,12 +29,14 @@ void measure(const char* name, Form form) {
   const VectorX<Scalar> r = VectorX<Scalar>::Constant(m, Scalar(0.01));
   UnscentedSettings<Scalar> settings;
   settings.form = form;
+  const std::size_t before = mallinfo2().uordblks + mallinfo2().hblkhd;
   UnscentedFilter<Scalar> filter(n, m, settings);
+  const std::size_t bytes = mallinfo2().uordblks + mallinfo2().hblkhd - before;
   filter.set(x, p);
   const auto stay = [](auto) { return true; };
   const auto ranges = [](const auto& points, auto predicted) {
     for (int r = 0; r < int(predicted.cols()); ++r) {
-      const int node = 3 * (r % 12);
+      const int node = 3 * (r % (int(points.cols()) / 6));
       predicted.col(r) =
           ((points.col(node).array() - 5).square() + (points.col(node + 1).array() - 2).square() +
            (points.col(node + 2).array() - 3).square())
@@ -53,15 +58,17 @@ void measure(const char* name, Form form) {
     std::nth_element(v.begin(), v.begin() + v.size() / 2, v.end());
     return v[v.size() / 2];
   };
-  std::printf("%-24s predict %7.1f us   correct %7.1f us\n", name, median(predict),
-              median(correct));
+  std::printf("%2d rods  %-20s predict %9.1f us   correct %9.1f us   %8.0f kB\n", rods, name,
+              median(predict), median(correct), double(bytes) / 1024);
 }
 
 }  // namespace
 
 int main() {
-  measure<double>("covariance, double", Form::kCovariance);
-  measure<float>("covariance, float", Form::kCovariance);
-  measure<double>("square root, double", Form::kSquareRoot);
-  measure<float>("square root, float", Form::kSquareRoot);
+  for (const int rods : {3, 6, 12, 24, 48}) {
+    measure<double>("covariance, double", Form::kCovariance, rods);
+    measure<float>("covariance, float", Form::kCovariance, rods);
+    measure<double>("square root, double", Form::kSquareRoot, rods);
+    measure<float>("square root, float", Form::kSquareRoot, rods);
+  }
 }

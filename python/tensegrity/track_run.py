@@ -33,6 +33,7 @@ _HEALTH = (
     "ranges_rejected",
     "inclinations_used",
     "inclinations_rejected",
+    "imu_rejected",
     "dropped",
     "gaps",
     "failed_predictions",

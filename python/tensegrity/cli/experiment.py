@@ -80,6 +80,7 @@ def _table(outcomes: list[Outcome]) -> Table:
         "faces [%]",
         "rejected [%]",
         "angles",
+        "IMU",
         "restarts",
     )
     table = Table("", *(Column(name, justify="right") for name in names))
@@ -98,6 +99,7 @@ def _table(outcomes: list[Outcome]) -> Table:
             f"{100 * np.mean([e.face_right.mean() for e in errors]):.1f}",
             f"{100 * rejected / max(used + rejected, 1):.1f}",
             str(sum(h.inclinations_rejected for h in health)),
+            str(sum(h.imu_rejected for h in health)),
             str(sum(h.restarts for h in health)),
         )
     return table
@@ -106,7 +108,7 @@ def _table(outcomes: list[Outcome]) -> Table:
 def _csv(outcomes: list[Outcome]) -> str:
     lines = [
         "setting,seed,centre_of_mass_rmse_m,endcap_rmse_m,nees_median,first_face_found,"
-        "faces_right,ranges_used,ranges_rejected,inclinations_rejected,restarts"
+        "faces_right,ranges_used,ranges_rejected,inclinations_rejected,imu_rejected,restarts"
     ]
     for run in outcomes:
         errors, health = run.settled, run.track.health
@@ -114,6 +116,6 @@ def _csv(outcomes: list[Outcome]) -> str:
             f"{run.setting},{run.seed},{errors.centre_of_mass_rmse:.4f},{errors.node_rmse:.4f},"
             f"{np.median(errors.nees) / 3:.3f},{int(run.found_face)},"
             f"{errors.face_right.mean():.4f},{health.ranges_used},{health.ranges_rejected},"
-            f"{health.inclinations_rejected},{health.restarts}"
+            f"{health.inclinations_rejected},{health.imu_rejected},{health.restarts}"
         )
     return "\n".join(lines) + "\n"
