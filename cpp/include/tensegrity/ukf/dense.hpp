@@ -56,11 +56,13 @@ void mirror_lower(MatrixRef<Scalar> p) {
 
 // Lower triangular root with root root' = p; reads the lower triangle of p, writes zeros above the
 // root's diagonal. A pivot that is zero to rounding, or below, gives a column of zeros: a
-// semidefinite p has no variance in that direction.
+// semidefinite p has no variance in that direction. So does one whose root would have no square.
 template <typename Scalar>
 void cholesky(const ConstMatrixRef<Scalar>& p, MatrixRef<Scalar> root) {
   const Eigen::Index n = p.rows();
-  const Scalar tiny = Scalar(n) * std::numeric_limits<Scalar>::epsilon();
+  using Limits = std::numeric_limits<Scalar>;
+  const Scalar tiny = Scalar(n) * Limits::epsilon();
+  constexpr Scalar kLeast = Limits::min() / Limits::epsilon();
   for (Eigen::Index j = 0; j < n; ++j) {
     const Eigen::Index rest = n - j;
     Scalar* column = &root(j, j);
@@ -81,7 +83,7 @@ void cholesky(const ConstMatrixRef<Scalar>& p, MatrixRef<Scalar> root) {
       for (Eigen::Index i = 0; i < rest; ++i) column[i] -= f0 * c0[i];
     }
     const Scalar pivot = column[0];
-    if (!(pivot > tiny * p(j, j))) {
+    if (!(pivot > tiny * p(j, j)) || pivot < kLeast) {
       for (Eigen::Index i = 0; i < rest; ++i) column[i] = 0;
       continue;
     }
