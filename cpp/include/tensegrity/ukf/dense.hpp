@@ -116,7 +116,10 @@ void triangularise(MatrixRef<Scalar> a) {
     Scalar* v = &a(0, j);
     auto tail = a.col(j).tail(rows - j);
     const Scalar norm = tail.norm();
-    if (!(norm > 0)) continue;
+    if (!(norm * norm > std::numeric_limits<Scalar>::min())) {  // its square is rounding
+      tail.setZero();
+      continue;
+    }
     const Scalar diagonal = v[j] > 0 ? -norm : norm;
     v[j] -= diagonal;
     const Scalar factor = 1 / (diagonal * v[j]);  // -2 / |v|^2
