@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 
 from tensegrity.files import new_directory
-from tensegrity.ranging.sequence import RangingSequence
+from tensegrity.ranging.sequence import ENDCAPS_FILE, RangingSequence, write_endcaps
+from tensegrity.sequence.sequence import EndcapStream
 from tensegrity.sequence.table import Column, write_csv
 from tensegrity.tracking import Track, floor_errors, track_errors
 
 STATE_FILE = "state.csv"
-ENDCAPS_FILE = "endcaps.csv"
 METRICS_FILE = "metrics.json"
 FIGURE_FILE = "path.png"
 
@@ -54,13 +54,8 @@ def write_track(
     Raises :class:`InputError` when ``path`` is not free, and without matplotlib for ``figure``.
     """
     with new_directory(Path(path), marker=STATE_FILE, overwrite=overwrite) as folder:
-        names = [f"q_{node}_{axis}" for node in track.net.node_ids for axis in "xyz"]
-        write_csv(
-            folder / ENDCAPS_FILE,
-            [Column(name, "a coordinate [m]") for name in names],
-            track.t_ns,
-            track.nodes.reshape(len(track), -1),
-        )
+        endcaps = EndcapStream(track.t_ns, track.nodes)
+        write_endcaps(folder / ENDCAPS_FILE, endcaps, track.net)
         std = np.sqrt(np.diagonal(track.centre_of_mass_covariance, axis1=1, axis2=2))
         columns = [
             *(Column(f"com_{axis}", "a coordinate [m]") for axis in "xyz"),

@@ -144,11 +144,15 @@ def write_sequence(sequence: RangingSequence, path: str | Path, *, overwrite: bo
             motors = sequence.motors
             write_csv(folder / MOTORS_FILE, _motor_columns(net), motors.t_ns, motors.rest_lengths)
         if sequence.endcaps is not None:
-            endcaps = sequence.endcaps
-            values = endcaps.position.reshape(len(endcaps.t_ns), -1)
-            write_csv(folder / ENDCAPS_FILE, _endcap_columns(net), endcaps.t_ns, values)
+            write_endcaps(folder / ENDCAPS_FILE, sequence.endcaps, net)
         if sequence.floor_truth is not None:
             write_floor_truth(folder / FLOOR_TRUTH_FILE, sequence.floor_truth)
+
+
+def write_endcaps(file: Path, endcaps: EndcapStream, net: Net) -> None:
+    """Write an ``endcaps.csv`` of the ends of the net's rods."""
+    values = endcaps.position.reshape(len(endcaps.t_ns), -1)
+    write_csv(file, _endcap_columns(net), endcaps.t_ns, values)
 
 
 def _motor_columns(net: Net) -> list[Column]:
