@@ -22,14 +22,14 @@ struct Kinematics {
 // All anchored endcaps in one measurement: their errors are correlated through the shape.
 // `Contacts` is the belief's anchor_count.
 template <int Contacts, typename B, int N, typename Scalar = typename B::Scalar>
-Innovation<B, 3 * Contacts> contact_innovation(const B& belief,
-                                               const Kinematics<Scalar, N, B::Extra>& k) {
+Innovation<B, 3 * Contacts, Contacts> contact_innovation(const B& belief,
+                                                         const Kinematics<Scalar, N, B::Extra>& k) {
   using M3 = Matrix3<Scalar>;
-  const int rows = padded(belief.dim());
   const M3& r = belief.rotation;
   const auto& p = belief.covariance;
 
-  Innovation<B, 3 * Contacts> z;
+  Innovation<B, 3 * Contacts, Contacts> z;
+  constexpr int kStates = decltype(z)::kStates;
   std::array<Matrix<Scalar, 3, B::Extra>, Contacts> f;  // R dh/d(extra)
   for (int i = 0; i < Contacts; ++i) {
     const int id = belief.anchor_ids[std::size_t(i)];
@@ -39,21 +39,27 @@ Innovation<B, 3 * Contacts> contact_innovation(const B& belief,
     z.residual.template segment<3>(3 * i) =
         r * k.h.col(id) + belief.position - belief.anchors.col(i);
     for (int c = 0; c < 3; ++c) {
-      auto cross = z.cross.col(3 * i + c).head(rows);
-      cross = p.col(B::kPosition + c).head(rows) - p.col(at + c).head(rows);
-      for (int e = 0; e < B::Extra; ++e) cross += fi(c, e) * p.col(B::kExtra + e).head(rows);
+      Sum<Scalar, kStates, 2 + B::Extra> cross;
+      cross.add(Scalar(1), &p(0, B::kPosition + c));
+      cross.add(Scalar(-1), &p(0, at + c));
+      for (int e = 0; e < B::Extra; ++e) cross.add(fi(c, e), &p(0, B::kExtra + e));
+      cross.store(&z.cross(0, 3 * i + c));
     }
   }
   for (int i = 0; i < Contacts; ++i) {
+    const int a = 3 * belief.anchor_ids[std::size_t(i)];
+    const auto& fi = f[std::size_t(i)];
     for (int j = 0; j <= i; ++j) {
-      const auto seen = z.cross.template middleCols<3>(3 * j);
-      const M3 noise = k.covariance.template block<3, 3>(3 * belief.anchor_ids[std::size_t(i)],
-                                                         3 * belief.anchor_ids[std::size_t(j)]);
-      z.covariance.template block<3, 3>(3 * i, 3 * j) =
-          seen.template middleRows<3>(B::kPosition) -
-          seen.template middleRows<3>(B::anchor_index(i)) +
-          f[std::size_t(i)] * seen.template middleRows<B::Extra>(B::kExtra) +
-          r * noise * r.transpose();
+      const M3 noise = k.covariance.template block<3, 3>(a, 3 * belief.anchor_ids[std::size_t(j)]);
+      const M3 turned = r.lazyProduct(noise.lazyProduct(r.transpose()).eval());
+      for (int c = 0; c < 3; ++c) {
+        const auto seen = z.cross.col(3 * j + c);
+        for (int row = 0; row < 3; ++row) {
+          Scalar sum = turned(row, c) + seen[B::kPosition + row] - seen[B::anchor_index(i) + row];
+          for (int e = 0; e < B::Extra; ++e) sum += fi(row, e) * seen[B::kExtra + e];
+          z.covariance(3 * i + row, 3 * j + c) = sum;
+        }
+      }
     }
   }
   return z;

@@ -10,13 +10,15 @@
 
 namespace tensegrity::inekf {
 
-// A linearised measurement of `Rows` rows. Beyond the belief's dim() rows `cross` is zero.
-template <typename B, int Rows>
+// A linearised measurement of `Rows` rows, of a belief with at most `Anchors` anchors: fewer make
+// every matrix smaller.
+template <typename B, int Rows, int Anchors = B::MaxAnchors>
 struct Innovation {
   using Scalar = typename B::Scalar;
-  Vector<Scalar, Rows> residual;                                 // z = H e + n
-  Matrix<Scalar, B::Covariance::RowsAtCompileTime, Rows> cross;  // P H^T
-  Matrix<Scalar, Rows> covariance;                               // S = H P H^T + N, lower triangle
+  static constexpr int kStates = padded(B::kAnchors + 3 * Anchors);
+  Vector<Scalar, Rows> residual;        // z = H e + n
+  Matrix<Scalar, kStates, Rows> cross;  // P H^T
+  Matrix<Scalar, Rows> covariance;      // S = H P H^T + N, lower triangle
 };
 
 struct Correction {
@@ -28,8 +30,9 @@ struct Correction {
 // belief is as it was.
 //
 // With S = L D L^T, y = L^-1 z and W = P H^T L^-T: e = W D^-1 y and P <- P - W D^-1 W^T.
-template <typename B, int Rows, typename Scalar = typename B::Scalar>
-Correction correct(B& belief, const Innovation<B, Rows>& innovation, Scalar gate) {
+template <typename B, int Rows, int Anchors, typename Scalar = typename B::Scalar>
+Correction correct(B& belief, const Innovation<B, Rows, Anchors>& innovation, Scalar gate) {
+  constexpr int kStates = Innovation<B, Rows, Anchors>::kStates;
   Correction result;
   Ldlt<Scalar, Rows> factors;
   if (!factors.factor(innovation.covariance)) {
@@ -48,16 +51,20 @@ Correction correct(B& belief, const Innovation<B, Rows>& innovation, Scalar gate
     result.status = Status::kRejected;
     return result;
   }
-  const int rows = padded(belief.dim());
-  auto w = innovation.cross;
-  typename B::ErrorVector error = B::ErrorVector::Zero();
+  Matrix<Scalar, kStates, Rows> w;
+  Sum<Scalar, kStates, Rows> error;
   for (int j = 0; j < Rows; ++j) {
-    for (int k = 0; k < j; ++k) w.col(j).head(rows) -= factors.l(j, k) * w.col(k).head(rows);
-    error.head(rows) += weighted[j] * w.col(j).head(rows);
+    Sum<Scalar, kStates, Rows> column;
+    column.add(Scalar(1), &innovation.cross(0, j));
+    for (int k = 0; k < j; ++k) column.add(-factors.l(j, k), &w(0, k));
+    column.store(&w(0, j));
+    error.add(weighted[j], &w(0, j));
   }
-  for (int j = 0; j < Rows; ++j) w.col(j).head(rows) *= std::sqrt(factors.inverse_diagonal()[j]);
-  subtract_outer(belief.covariance, w, Rows, rows);
-  belief.retract(error);
+  typename B::ErrorVector e = B::ErrorVector::Zero();
+  error.store(&e[0]);
+  for (int j = 0; j < Rows; ++j) w.col(j) *= std::sqrt(factors.inverse_diagonal()[j]);
+  subtract_outer(belief.covariance, w, Rows, kStates);
+  belief.retract(e);
   return result;
 }
 

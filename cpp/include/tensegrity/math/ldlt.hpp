@@ -16,34 +16,37 @@ class Ldlt {
  public:
   // False unless A is positive definite (to rounding) and finite.
   bool factor(const Matrix<Scalar, N>& a) {
-    for (int j = 0; j < N; ++j) {
+    for (int j = 0; j < N; ++j) {  // whole packets from the one on the diagonal on
+      for (int i = packet_start(j); i < j; ++i) l_(i, j) = 0;
       for (int i = j; i < N; ++i) l_(i, j) = a(i, j);
+      for (int i = N; i < kRows; ++i) l_(i, j) = 0;
     }
-    for (int j = 0; j < N; ++j) {
-      const Scalar pivot = l_(j, j);
-      if (!(pivot > 0) || !std::isfinite(pivot)) return false;
-      inverse_[j] = 1 / pivot;
-      Column column = inverse_[j] * l_.col(j);
-      for (int i = 0; i <= j; ++i) column[i] = 0;
-      for (int k = j + 1; k < N; ++k) l_.col(k) -= l_(k, j) * column;
-      l_.col(j) = column;
-    }
-    return true;
+    return factor_from<0>();
   }
 
   // L^-1 b
   Vector<Scalar, N> forward(const Vector<Scalar, N>& b) const {
     Column x = Column::Zero();
     x.template head<N>() = b;
-    for (int j = 0; j < N; ++j) x -= x[j] * l_.col(j);
+    for (int j = 0; j < N; ++j) {
+      const Scalar factor = x[j];
+      for (int i = packet_start(j); i < kRows; i += 4) {
+        Packet<Scalar> rest(&x[i]);
+        rest.subtract(factor, Packet<Scalar>(&l_(i, j)));
+        rest.store(&x[i]);
+      }
+    }
     return x.template head<N>();
   }
 
   // A^-1 b
   Vector<Scalar, N> solve(const Vector<Scalar, N>& b) const {
     Vector<Scalar, N> x = forward(b).cwiseProduct(inverse_);
+    // Unrolled, and what was found last comes last: the chain of dependent operations is short.
+#pragma GCC unroll 16
     for (int j = N - 1; j >= 0; --j) {
-      for (int i = j + 1; i < N; ++i) x[j] -= l_(i, j) * x[i];
+#pragma GCC unroll 16
+      for (int i = N - 1; i > j; --i) x[j] -= l_(i, j) * x[i];
     }
     return x;
   }
@@ -54,10 +57,46 @@ class Ldlt {
   const Vector<Scalar, N>& inverse_diagonal() const { return inverse_; }
 
  private:
-  using Column = Vector<Scalar, padded(N)>;
+  static constexpr int kRows = padded(N);  // whole packets
+  using Column = Vector<Scalar, kRows>;
 
-  Matrix<Scalar, padded(N), N> l_ = Matrix<Scalar, padded(N), N>::Zero();  // whole packets
-  Vector<Scalar, N> inverse_;
+  // Four columns from `First` on, and those after them. A column of A less what the columns before
+  // it hold of it is d times that of L.
+  template <int First>
+  bool factor_from() {
+    constexpr int kPackets = (kRows - First) / 4;
+    for (int j = First; j < std::min(First + 4, N); ++j) {
+      Packet<Scalar> rest[kPackets];
+#pragma GCC unroll 5
+      for (int i = 0; i < kPackets; ++i) rest[i] = Packet<Scalar>(&l_(First + 4 * i, j));
+      for (int k = 0; k < j; ++k) {
+        const Scalar factor = l_(j, k) * pivots_[k];
+#pragma GCC unroll 5
+        for (int i = 0; i < kPackets; ++i) {
+          rest[i].subtract(factor, Packet<Scalar>(&l_(First + 4 * i, k)));
+        }
+      }
+      rest[0].store(&l_(First, j));
+      const Scalar pivot = l_(j, j);
+      if (!(pivot > 0) || !std::isfinite(pivot)) return false;
+      pivots_[j] = pivot;
+      inverse_[j] = 1 / pivot;
+#pragma GCC unroll 5
+      for (int i = 0; i < kPackets; ++i) {
+        Packet<Scalar> column;
+        column.add(inverse_[j], rest[i]);
+        column.store(&l_(First + 4 * i, j));
+      }
+      for (int i = 0; i < 4; ++i) {
+        if (First + i <= j) l_(First + i, j) = 0;
+      }
+    }
+    if constexpr (First + 4 < N) return factor_from<First + 4>();
+    return true;
+  }
+
+  Matrix<Scalar, kRows, N> l_;          // not set above the packets on the diagonal
+  Vector<Scalar, N> pivots_, inverse_;  // D, 1 / D
 };
 
 }  // namespace tensegrity

@@ -34,12 +34,13 @@ struct Gamma {
 
   explicit Gamma(const Vector3<Scalar>& x) : x_(x) {
     const Scalar a2 = x.squaredNorm();
-    // c_m: coefficients of hat(x)^m in the sums, stable for small angles.
+    // c_m: coefficients of hat(x)^m in the sums, stable for small angles. Reciprocals are written
+    // out: a division takes as long as ten multiplications.
     if (a2 < small_angle_squared()) {
-      c1_ = 1 - a2 / 6 * (1 - a2 / 20 * (1 - a2 / 42));
-      c2_ = (1 - a2 / 12 * (1 - a2 / 30 * (1 - a2 / 56))) / 2;
-      c3_ = (1 - a2 / 20 * (1 - a2 / 42 * (1 - a2 / 72))) / 6;
-      c4_ = (1 - a2 / 30 * (1 - a2 / 56 * (1 - a2 / 90))) / 24;
+      c1_ = 1 - a2 * over(6) * (1 - a2 * over(20) * (1 - a2 * over(42)));
+      c2_ = over(2) - a2 * over(24) * (1 - a2 * over(30) * (1 - a2 * over(56)));
+      c3_ = over(6) - a2 * over(120) * (1 - a2 * over(42) * (1 - a2 * over(72)));
+      c4_ = over(24) - a2 * over(720) * (1 - a2 * over(56) * (1 - a2 * over(90)));
     } else {
       const Scalar a = std::sqrt(a2);
       c1_ = std::sin(a) / a;
@@ -47,24 +48,19 @@ struct Gamma {
       c3_ = (1 - c1_) / a2;
       c4_ = (Scalar(0.5) - c2_) / a2;
     }
-    const Matrix3<Scalar> w = hat(x);
-    const Matrix3<Scalar> ww = x * x.transpose() - a2 * Matrix3<Scalar>::Identity();
-    g0 = Matrix3<Scalar>::Identity() + c1_ * w + c2_ * ww;
-    g1 = Matrix3<Scalar>::Identity() + c2_ * w + c3_ * ww;
-    g2 = Scalar(0.5) * Matrix3<Scalar>::Identity() + c3_ * w + c4_ * ww;
+    g0 = sum(1, c1_, c2_);
+    g1 = sum(1, c2_, c3_);
+    g2 = sum(over(2), c3_, c4_);
   }
 
   // d(Gamma_1(x) b)/dx and d(Gamma_2(x) b)/dx: how velocity and position after a constant specific
   // force b change with the rotation on the way.
-  Matrix3<Scalar> g1_derivative(const Vector3<Scalar>& b) const {
-    const Scalar a2 = x_.squaredNorm();
-    return derivative(b, c2_, slope(a2, c1_, c2_, 2, 12, 15, Scalar(37.333333333333336), 67.5), c3_,
-                      slope(a2, c2_, c3_, 3, 60, 21, 48, 82.5));
-  }
-  Matrix3<Scalar> g2_derivative(const Vector3<Scalar>& b) const {
-    const Scalar a2 = x_.squaredNorm();
-    return derivative(b, c3_, slope(a2, c2_, c3_, 3, 60, 21, 48, 82.5), c4_,
-                      slope(a2, c3_, c4_, 4, 360, 28, 60, 99));
+  struct Derivatives {
+    Matrix3<Scalar> g1, g2;
+  };
+  Derivatives derivatives(const Vector3<Scalar>& b) const {
+    const Slopes k = slopes();
+    return {derivative(b, c2_, k.c2, c3_, k.c3), derivative(b, c3_, k.c3, c4_, k.c4)};
   }
 
   // Below this the series above is exact to rounding: the first omitted term is a^8 / 9! of one.
@@ -73,22 +69,53 @@ struct Gamma {
   }
 
  private:
-  // (dc_m/da) / a = (c_{m-1} - m c_m) / a^2, which cancels for small a: there by its series
-  // -(1 - a^2/q (1 - a^2/r (1 - a^2/s))) / p, whose next term is below 1e-12 of it at a = 0.3.
-  static Scalar slope(Scalar a2, Scalar c_before, Scalar c, int m, Scalar p, Scalar q, Scalar r,
-                      Scalar s) {
-    if (a2 < Scalar(0.1)) return -(1 - a2 / q * (1 - a2 / r * (1 - a2 / s))) / p;
-    return (c_before - Scalar(m) * c) / a2;
+  static constexpr Scalar over(int n) { return Scalar(1) / Scalar(n); }
+
+  struct Slopes {
+    Scalar c2, c3, c4;
+  };
+  // (dc_m/da) / a = (c_{m-1} - m c_m) / a^2, which cancels for small a: there by its series, whose
+  // next term is below 1e-12 of it at a = 0.3.
+  Slopes slopes() const {
+    const Scalar a2 = x_.squaredNorm();
+    if (a2 < Scalar(0.1)) {
+      return {-over(12) + a2 * over(180) * (1 - a2 * over(112) * 3 * (1 - a2 * over(135) * 2)),
+              -over(60) + a2 * over(1260) * (1 - a2 * over(48) * (1 - a2 * over(165) * 2)),
+              -over(360) + a2 * over(10080) * (1 - a2 * over(60) * (1 - a2 * over(99)))};
+    }
+    const Scalar inverse = 1 / a2;
+    return {(c1_ - 2 * c2_) * inverse, (c2_ - 3 * c3_) * inverse, (c3_ - 4 * c4_) * inverse};
   }
 
-  // d/dx of c x b + d x (x b), with slopes cs and ds of c and d.
+  // a I + b hat(x) + c hat(x)^2
+  Matrix3<Scalar> sum(Scalar a, Scalar b, Scalar c) const {
+    const Scalar x = x_[0], y = x_[1], z = x_[2];
+    const Scalar cxy = c * x * y, cxz = c * x * z, cyz = c * y * z;
+    Matrix3<Scalar> m;
+    m << a - c * (y * y + z * z), cxy - b * z, cxz + b * y,  //
+        cxy + b * z, a - c * (x * x + z * z), cyz - b * x,   //
+        cxz - b * y, cyz + b * x, a - c * (x * x + y * y);
+    return m;
+  }
+
+  // d/dx of c x b + d x (x b), with slopes cs and ds of c and d:
+  //   -c hat(b) + d (x b' - 2 b x' + x'b I) + (cs x x b + ds x x (x x b)) x'
   Matrix3<Scalar> derivative(const Vector3<Scalar>& b, Scalar c, Scalar cs, Scalar d,
                              Scalar ds) const {
-    const Scalar xb = x_.dot(b);
-    const Vector3<Scalar> twice = x_ * xb - b * x_.squaredNorm();
-    Matrix3<Scalar> m = -c * hat(b) + d * (x_ * b.transpose() - 2 * b * x_.transpose());
-    m.diagonal().array() += d * xb;
-    m += (cs * x_.cross(b) + ds * twice) * x_.transpose();
+    const Scalar xb = x_.dot(b), xx = x_.squaredNorm();
+    const Vector3<Scalar> across = x_.cross(b);
+    Matrix3<Scalar> m;
+    for (int i = 0; i < 3; ++i) {
+      const Scalar by_x = cs * across[i] + ds * (x_[i] * xb - b[i] * xx) - 2 * d * b[i];
+      for (int j = 0; j < 3; ++j) m(i, j) = by_x * x_[j] + d * x_[i] * b[j];
+      m(i, i) += d * xb;
+    }
+    m(0, 1) += c * b[2];
+    m(1, 0) -= c * b[2];
+    m(0, 2) -= c * b[1];
+    m(2, 0) += c * b[1];
+    m(1, 2) += c * b[0];
+    m(2, 1) -= c * b[0];
     return m;
   }
 
@@ -169,7 +196,19 @@ Matrix3<Scalar> shortest_rotation(const Vector3<Scalar>& from, const Vector3<Sca
 // decomposition, exact to second order in the drift.
 template <typename Scalar>
 Matrix3<Scalar> orthonormalized(const Matrix3<Scalar>& r) {
-  return Scalar(0.5) * r * (3 * Matrix3<Scalar>::Identity() - r.transpose() * r);
+  // R (3 I - R'R) / 2
+  const Scalar xy = r.col(0).dot(r.col(1)), xz = r.col(0).dot(r.col(2)),
+               yz = r.col(1).dot(r.col(2));
+  const Scalar xx = 3 - r.col(0).squaredNorm(), yy = 3 - r.col(1).squaredNorm(),
+               zz = 3 - r.col(2).squaredNorm();
+  Matrix3<Scalar> out;
+  for (int i = 0; i < 3; ++i) {
+    const Scalar a = r(i, 0) / 2, b = r(i, 1) / 2, c = r(i, 2) / 2;
+    out(i, 0) = a * xx - b * xy - c * xz;
+    out(i, 1) = b * yy - a * xy - c * yz;
+    out(i, 2) = c * zz - a * xz - b * yz;
+  }
+  return out;
 }
 
 }  // namespace tensegrity

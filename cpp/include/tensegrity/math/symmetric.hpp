@@ -1,96 +1,185 @@
 // What a filter does to its covariance all day, written for the columns of a matrix in memory.
 //
-// A covariance is stored in full, so that any of its columns can be read at once. Loops run over
-// whole packets of four rows: matrices here have a multiple of four rows (`padded`), and are zero
-// beyond their active size.
+// A covariance is stored in full, so that any of its columns can be read at once, but computed in
+// its lower triangle. Loops run over whole packets of four rows: matrices here have a multiple of
+// four rows (`padded`), and are zero beyond their active size.
 #pragma once
 
+#include "tensegrity/math/packet.hpp"
 #include "tensegrity/types.hpp"
 
 namespace tensegrity {
 
-// The next multiple of four.
-constexpr int padded(int size) { return (size + 3) / 4 * 4; }
-// The packet of four that `row` is in starts here.
-constexpr int packet_start(int row) { return row / 4 * 4; }
-
-// Four rows of a column.
-template <typename Scalar>
-using Packet = Eigen::Array<Scalar, 4, 1>;
-template <typename Scalar>
-auto packet(Scalar* rows) {
-  return Eigen::Map<Packet<Scalar>>(rows);
-}
-template <typename Scalar>
-Packet<Scalar> packet(const Scalar* rows) {
-  return Eigen::Map<const Packet<Scalar>>(rows);
-}
-
 // Columns `to` .. `to + 2` of P get those of `from` times m': P <- P (I + m at rows `to`, columns
-// `from`)'. The first `rows` rows.
+// `from`)'. Rows `first` (a multiple of four) to `end`.
 template <typename Derived>
 void add_columns(Eigen::MatrixBase<Derived>& p, int to, int from,
-                 const Matrix3<typename Derived::Scalar>& m, int rows) {
+                 const Matrix3<typename Derived::Scalar>& m, int first, int end) {
   using Scalar = typename Derived::Scalar;
   constexpr int kStride = Derived::RowsAtCompileTime;
   Scalar* target = &p.derived().coeffRef(0, to);
   const Scalar* source = &p.derived().coeffRef(0, from);
-  const Matrix3<Scalar> c = m;         // not in memory that the loop may write to
-  for (int i = 0; i < rows; i += 4) {  // what is loaded is used thrice
-    const Packet<Scalar> a0 = packet(source + i), a1 = packet(source + i + kStride),
-                         a2 = packet(source + i + 2 * kStride);
-    packet(target + i) += c(0, 0) * a0 + c(0, 1) * a1 + c(0, 2) * a2;
-    packet(target + i + kStride) += c(1, 0) * a0 + c(1, 1) * a1 + c(1, 2) * a2;
-    packet(target + i + 2 * kStride) += c(2, 0) * a0 + c(2, 1) * a1 + c(2, 2) * a2;
+  const Matrix3<Scalar> c = m;            // not in memory that the loop may write to
+  for (int i = first; i < end; i += 4) {  // what is loaded is used thrice
+    const Packet<Scalar> a0(source + i), a1(source + i + kStride), a2(source + i + 2 * kStride);
+    for (int k = 0; k < 3; ++k) {
+      Packet<Scalar> x(target + i + k * kStride);
+      x.add(c(k, 0), a0);
+      x.add(c(k, 1), a1);
+      x.add(c(k, 2), a2);
+      x.store(target + i + k * kStride);
+    }
+  }
+}
+
+// The same with m = factor I, all rows up to `end`.
+template <typename Derived>
+void add_columns(Eigen::MatrixBase<Derived>& p, int to, int from, typename Derived::Scalar factor,
+                 int end) {
+  using Scalar = typename Derived::Scalar;
+  for (int k = 0; k < 3; ++k) {
+    Scalar* target = &p.derived().coeffRef(0, to + k);
+    const Scalar* source = &p.derived().coeffRef(0, from + k);
+    for (int i = 0; i < end; i += 4) {
+      Packet<Scalar> x(target + i);
+      x.add(factor, Packet<Scalar>(source + i));
+      x.store(target + i);
+    }
   }
 }
 
 // Copies the lower triangle of the first `size` rows and columns to the upper one.
 template <typename Derived>
-void mirror(Eigen::MatrixBase<Derived>& p, int size) {
+void mirror(Eigen::MatrixBase<Derived>& matrix, int size) {
   static_assert(Derived::RowsAtCompileTime % 4 == 0, "whole packets");
+  using Scalar = typename Derived::Scalar;
+  constexpr int kStride = Derived::RowsAtCompileTime;
+  Scalar* p = &matrix.derived().coeffRef(0, 0);
   for (int j = 0; j < size; j += 4) {
-    for (int c = j + 1; c < j + 4; ++c) {
-      for (int r = j; r < c; ++r) p(r, c) = p(c, r);
+    Scalar* own = p + j * kStride + j;  // block on the diagonal
+    for (int c = 1; c < 4; ++c) {
+      for (int r = 0; r < c; ++r) own[c * kStride + r] = own[r * kStride + c];
     }
     for (int i = j + 4; i < size; i += 4) {
-      for (int c = i; c < i + 4; ++c) {
-        packet(&p(j, c)) =
-            Packet<typename Derived::Scalar>(p(c, j), p(c, j + 1), p(c, j + 2), p(c, j + 3));
-      }
+      Packet<Scalar> block[4];
+      const Scalar* lower = p + j * kStride + i;
+      Scalar* upper = p + i * kStride + j;
+#pragma GCC unroll 4
+      for (int c = 0; c < 4; ++c) block[c] = Packet<Scalar>(lower + c * kStride);
+      Packet<Scalar>::transpose(block);
+#pragma GCC unroll 4
+      for (int c = 0; c < 4; ++c) block[c].store(upper + c * kStride);
     }
   }
 }
 
-// P <- P - W W' with the first `count` columns of W, on the first `size` rows and columns. Every
-// pair of elements across the diagonal is the same sum of the same products: P stays symmetric.
-template <typename P, typename W>
-void subtract_outer(Eigen::MatrixBase<P>& p, const Eigen::MatrixBase<W>& w, int count, int size) {
-  using Scalar = typename P::Scalar;
-  constexpr int kRows = W::RowsAtCompileTime, kStride = P::RowsAtCompileTime;
-  int k = 0;
-  for (; k + 4 <= count; k += 4) {  // two columns of P against four of W: loads are used twice
-    const Scalar* g = &w.derived().coeffRef(0, k);
-    for (int j = 0; j < size; j += 2) {
-      const Scalar a0 = g[j], a1 = g[j + kRows], a2 = g[j + 2 * kRows], a3 = g[j + 3 * kRows];
-      const Scalar b0 = g[j + 1], b1 = g[j + 1 + kRows], b2 = g[j + 1 + 2 * kRows],
-                   b3 = g[j + 1 + 3 * kRows];
-      Scalar* column = &p.derived().coeffRef(0, j);
-      for (int i = 0; i < size; i += 4) {
-        const Packet<Scalar> g0 = packet(g + i), g1 = packet(g + i + kRows),
-                             g2 = packet(g + i + 2 * kRows), g3 = packet(g + i + 3 * kRows);
-        packet(column + i) -= a0 * g0 + a1 * g1 + a2 * g2 + a3 * g3;
-        packet(column + i + kStride) -= b0 * g0 + b1 * g1 + b2 * g2 + b3 * g3;
+// sum a_i x_i of columns x_i of `Rows` rows in memory, up to `Capacity` of them.
+template <typename Scalar, int Rows, int Capacity>
+class Sum {
+ public:
+  static_assert(Rows % 4 == 0, "whole packets");
+
+  void add(Scalar factor, const Scalar* column) {
+    factors_[count_] = factor;
+    columns_[count_++] = column;
+  }
+  void store(Scalar* out) const { store_from<0>(out); }
+
+ private:
+  // So many sums at once that none waits for its last addition, and all stay in registers.
+  static constexpr int kMost = 7;
+  static constexpr int kPackets = Rows / 4;
+  static constexpr int kGroup = (kPackets + (kPackets - 1) / kMost) / ((kPackets - 1) / kMost + 1);
+
+  template <int First>
+  void store_from(Scalar* out) const {
+    constexpr int kHere = std::min(kGroup, kPackets - First);
+    Packet<Scalar> sum[kHere];
+    for (int k = 0; k < count_; ++k) {
+#pragma GCC unroll 7
+      for (int i = 0; i < kHere; ++i) {
+        sum[i].add(factors_[k], Packet<Scalar>(columns_[k] + 4 * (First + i)));
+      }
+    }
+#pragma GCC unroll 7
+    for (int i = 0; i < kHere; ++i) sum[i].store(out + 4 * (First + i));
+    if constexpr (First + kHere < kPackets) store_from<First + kHere>(out);
+  }
+
+  Scalar factors_[Capacity];
+  const Scalar* columns_[Capacity];
+  int count_ = 0;
+};
+
+namespace detail {
+
+// Four columns of P, `Packets` packets of rows: P <- P +- A B with `count` columns of A and rows of
+// B. What is loaded of A is used in every column, what is loaded of B in every packet, and the tile
+// stays in registers.
+template <int Packets, bool Subtract, typename Scalar>
+void add_product_tile(Scalar* p, int p_stride, const Scalar* a, int a_stride, const Scalar* b,
+                      int b_stride, int count) {
+  Packet<Scalar> tile[4][Packets];
+#pragma GCC unroll 4
+  for (int c = 0; c < 4; ++c) {
+#pragma GCC unroll 3
+    for (int k = 0; k < Packets; ++k) tile[c][k] = Packet<Scalar>(p + c * p_stride + 4 * k);
+  }
+  for (const Scalar* end = a + count * a_stride; a != end; a += a_stride, b += b_stride) {
+    Packet<Scalar> rows[Packets];
+#pragma GCC unroll 3
+    for (int k = 0; k < Packets; ++k) {
+      rows[k] = Packet<Scalar>(a + 4 * k);
+      rows[k].hold();
+    }
+#pragma GCC unroll 4
+    for (int c = 0; c < 4; ++c) {
+#pragma GCC unroll 3
+      for (int k = 0; k < Packets; ++k) {
+        if constexpr (Subtract) {
+          tile[c][k].subtract(b[c], rows[k]);
+        } else {
+          tile[c][k].add(b[c], rows[k]);
+        }
       }
     }
   }
-  for (; k < count; ++k) {
-    const Scalar* g = &w.derived().coeffRef(0, k);
-    for (int j = 0; j < size; ++j) {
-      Scalar* column = &p.derived().coeffRef(0, j);
-      for (int i = 0; i < size; i += 4) packet(column + i) -= g[j] * packet(g + i);
+#pragma GCC unroll 4
+  for (int c = 0; c < 4; ++c) {
+#pragma GCC unroll 3
+    for (int k = 0; k < Packets; ++k) tile[c][k].store(p + c * p_stride + 4 * k);
+  }
+}
+
+}  // namespace detail
+
+// The same for rows `first` to `end` (multiples of four) of P and A.
+template <bool Subtract, typename Scalar>
+void add_product(Scalar* p, int p_stride, const Scalar* a, int a_stride, const Scalar* b,
+                 int b_stride, int count, int first, int end) {
+  int i = first;
+  if constexpr (Packet<Scalar>::kRegisters == 1) {  // tiles of two packets fit the registers
+    for (; i + 8 <= end; i += 8) {
+      detail::add_product_tile<2, Subtract>(p + i, p_stride, a + i, a_stride, b, b_stride, count);
     }
   }
+  for (; i < end; i += 4) {
+    detail::add_product_tile<1, Subtract>(p + i, p_stride, a + i, a_stride, b, b_stride, count);
+  }
+}
+
+// P <- P - W W' with the first `count` columns of W, on the first `size` rows and columns.
+template <typename P, typename W>
+void subtract_outer(Eigen::MatrixBase<P>& p, const Eigen::MatrixBase<W>& w, int count, int size) {
+  static_assert(P::RowsAtCompileTime % 4 == 0 && W::RowsAtCompileTime % 4 == 0, "whole packets");
+  using Scalar = typename P::Scalar;
+  constexpr int kRows = W::RowsAtCompileTime, kStride = P::RowsAtCompileTime;
+  auto* to = &p.derived().coeffRef(0, 0);
+  const auto* from = &w.derived().coeffRef(0, 0);
+  for (int j = 0; j < size; j += 4) {
+    add_product<true>(to + j * kStride, kStride, from, kRows, from + j, kRows, count, j, size);
+  }
+  mirror(p, size);
 }
 
 }  // namespace tensegrity

@@ -31,8 +31,9 @@ namespace tensegrity::shape {
 
 template <typename Scalar>
 struct SolverOptions {
-  int max_iterations = 50;  // per start
-  // Length of the last tangent step [m].
+  int max_iterations = 50;        // of a solve that starts from the last solution
+  int max_cold_iterations = 850;  // of one that does not, over all its starts
+  // Of the solution: the next step would be shorter, judged by how fast the steps shrink [m].
   Scalar tolerance = std::is_same_v<Scalar, float> ? Scalar(1e-5) : Scalar(1e-6);
 };
 
@@ -70,7 +71,7 @@ class Solver {
     const Status input = check_lengths(lengths, prism_.rod_length);
     if (input != Status::kOk) return input;
     Solution best{rods_, std::numeric_limits<Scalar>::max(), 0, false, false};
-    if (warm_) best = minimise(rods_, lengths, newton_);
+    if (warm_) best = minimise(rods_, lengths, options_.max_iterations, newton_);
     int iterations = best.iterations;
     if (!warm_ || handedness(best.rods.endcaps(), prism_.moment_sign()) != Handedness::kRight) {
       best = solve_cold(lengths, iterations);
@@ -176,8 +177,9 @@ class Solver {
     return 9 * residual * residual;
   }
 
-  // One descent from `start` to a local minimum. `newton`: take second derivatives from the start.
-  Solution minimise(const Rods<Scalar>& start, const CableLengths<Scalar>& lengths,
+  // One descent from `start` to a local minimum in at most `limit` iterations. `newton`: take
+  // second derivatives from the start.
+  Solution minimise(const Rods<Scalar>& start, const CableLengths<Scalar>& lengths, int limit,
                     bool newton = false) const {
     const Scalar initial_damping = Scalar(1e-3);
     // Beyond this no second-order model of the lengths holds.
@@ -185,7 +187,8 @@ class Solver {
     LengthResiduals<Scalar> residuals(start, lengths);
     Solution now{start, residuals.cost(), 0, false, newton};
     Scalar damping = 0;
-    while (now.iterations < options_.max_iterations) {
+    Scalar last_length = 0;  // of the last step, which has to have been an undamped one
+    while (now.iterations < limit) {
       ++now.iterations;
       const Tangent<Scalar> gradient = residuals.gradient(now.rods);
       Ldlt<Scalar, kTangent> factor;
@@ -211,6 +214,11 @@ class Solver {
       const Scalar trial_cost = trial_residuals.cost();
       // Gauss-Newton as long as that makes much progress.
       now.newton = trial_cost > Scalar(0.1) * now.cost;
+      // With every step shorter by the same factor, as at the slowest, what is left after this one
+      // is length r / (1 - r), r = length / last_length.
+      const bool shrinks = damping == 0 && trial_cost < now.cost && 2 * length < last_length &&
+                           length * length < options_.tolerance * (last_length - length);
+      last_length = damping == 0 && trial_cost < now.cost ? length : Scalar(0);
       if (trial_cost < now.cost) {
         now.rods = trial;
         now.cost = trial_cost;
@@ -219,12 +227,18 @@ class Solver {
       } else {
         damping = std::max(10 * damping, initial_damping);
       }
-      if (length < options_.tolerance || now.cost < rounding_cost()) {
+      if (length < options_.tolerance || shrinks || now.cost < rounding_cost()) {
         now.converged = true;
         break;
       }
     }
     return now;
+  }
+
+  // No single start may use up what the others need.
+  static int start_limit(int limit, int iterations) {
+    constexpr int kPerStart = 50;
+    return std::min(limit - iterations, kPerStart);
   }
 
   // Best of the fixed starts that ends in a shape without crossing rods; among equally good ones
@@ -237,8 +251,9 @@ class Solver {
     const Scalar sign = prism_.moment_sign();
     Solution best{rods_, std::numeric_limits<Scalar>::max(), 0, false, false};
     bool best_is_positive = false;
-    for (int k = 0; k < kColdStarts; ++k) {
-      Solution candidate = minimise(cold_start(prism_, k), lengths);
+    const int limit = iterations + options_.max_cold_iterations;
+    for (int k = 0; k < kColdStarts && iterations < limit; ++k) {
+      Solution candidate = minimise(cold_start(prism_, k), lengths, start_limit(limit, iterations));
       iterations += candidate.iterations;
       Handedness hand = handedness(candidate.rods.endcaps(), sign);
       if (hand == Handedness::kMirrored) {
@@ -246,7 +261,7 @@ class Solver {
         hand = Handedness::kRight;
       }
       if (hand != Handedness::kRight) continue;
-      candidate = to_positive_fold(candidate, lengths, iterations);
+      candidate = to_positive_fold(candidate, lengths, limit, iterations);
       const bool is_positive = fold(candidate.rods, sign) > on_fold;
       const bool better = candidate.cost < best.cost - same_cost();
       const bool as_good = candidate.cost < best.cost + same_cost();
@@ -261,17 +276,17 @@ class Solver {
 
   // Crosses the fold from the branch of larger twist, if that is possible at no higher cost.
   Solution to_positive_fold(const Solution& solution, const CableLengths<Scalar>& lengths,
-                            int& iterations) const {
+                            int limit, int& iterations) const {
     const Scalar sign = prism_.moment_sign();
     if (fold(solution.rods, sign) >= 0) return solution;
     // Along the mechanism the lengths change as s x + kappa x^2 / 2: the other root.
     const FoldAnalysis<Scalar> analysis = analyse_fold(solution.rods);
     if (!(std::abs(analysis.curvature) > 0)) return solution;
-    const Scalar limit = Scalar(0.2) * prism_.rod_length;
+    const Scalar farthest = Scalar(0.2) * prism_.rod_length;
     const Scalar root = -2 * analysis.smallest() / analysis.curvature;
     Rods<Scalar> across = solution.rods;
-    across.retract(std::clamp(root, -limit, limit) * analysis.mechanism());
-    const Solution other = minimise(across, lengths);
+    across.retract(std::clamp(root, -farthest, farthest) * analysis.mechanism());
+    const Solution other = minimise(across, lengths, start_limit(limit, iterations));
     iterations += other.iterations;
     const bool as_good = other.cost < solution.cost + same_cost();
     const bool valid = handedness(other.rods.endcaps(), sign) == Handedness::kRight;

@@ -21,6 +21,7 @@ template <typename Scalar>
 class Row {
  public:
   static constexpr int kMaxBlocks = 6;
+  static constexpr int kMost = 3 * kMaxBlocks + 1;  // elements
 
   void add(int at, const Vector3<Scalar>& h) {
     for (int k = 0; k < blocks_; ++k) {
@@ -37,21 +38,13 @@ class Row {
     single_ = h;
   }
 
-  // P H'
-  template <typename Covariance>
-  Vector<Scalar, Covariance::RowsAtCompileTime> cross(const Covariance& p) const {
-    Vector<Scalar, Covariance::RowsAtCompileTime> c;
-    if (single_at_ >= 0) {
-      c = single_ * p.col(single_at_);
-    } else {
-      c.setZero();
-    }
+  // Calls `use(index, coefficient)` for every element that is not zero.
+  template <typename Use>
+  void for_each(const Use& use) const {
+    if (single_at_ >= 0) use(single_at_, single_);
     for (int k = 0; k < blocks_; ++k) {
-      const int at = at_[std::size_t(k)];
-      const Vector3<Scalar>& h = h_[std::size_t(k)];
-      c += h[0] * p.col(at) + h[1] * p.col(at + 1) + h[2] * p.col(at + 2);
+      for (int i = 0; i < 3; ++i) use(at_[std::size_t(k)] + i, h_[std::size_t(k)][i]);
     }
-    return c;
   }
   // H x
   template <typename Derived>
@@ -74,8 +67,9 @@ class Row {
 // Within the batch every row counts in full, so that the mean is that of the joint update; what a
 // row does not inform of is left out of the downdate at the end.
 //
-// The downdates of P wait until the end as columns g of P - sum g g': P is then read and written
-// once for all rows instead of once for each.
+// The downdates of P wait until the end: P is then read and written once for all rows instead of
+// once for each. What waits of a row is its c = P H' (with the rows before it applied) and 1/S, of
+// P - sum c c' / S; the error collected so far is sum c y / S with y the row's innovation.
 template <typename Scalar>
 class SequentialUpdate {
  public:
@@ -91,39 +85,61 @@ class SequentialUpdate {
   SequentialUpdate(const SequentialUpdate&) = delete;
   SequentialUpdate& operator=(const SequentialUpdate&) = delete;
 
-  // residual = H e + n with var(n) = variance > 0. Returns y^2 / S, the row's part of the
-  // chi-square; with it beyond `gate` (0: no gate) nothing happened. `information` in [0, 1] is the
-  // part of the downdate of P that is applied: 1 for a Gaussian measurement, less where the mean
-  // moves more than the data inform (robust likelihoods, friction.hpp).
+  // residual = H e + n with var(n) = variance > 0. Returns y^2, the row's part of the chi-square;
+  // with it beyond `gate` (0: no gate) nothing happened. `information` in [0, 1] is the part of the
+  // downdate of P that is applied: 1 for a Gaussian measurement, less where the mean moves more
+  // than the data inform (robust likelihoods, friction.hpp).
   Scalar correct(const Row<Scalar>& row, Scalar residual, Scalar variance, Scalar gate = 0,
                  Scalar information = 1) {
-    typename B::ErrorVector cross = row.cross(belief_.covariance);
-    for (int k = 0; k < waiting_; ++k) cross -= row.times(gains_.col(k)) * gains_.col(k);
-    const Scalar s = std::max(row.times(cross), Scalar(0)) + variance;
-    const Scalar y = residual - row.times(error_);
-    const Scalar chi_square = y * y / s;
-    if (!std::isfinite(chi_square) || (gate > 0 && chi_square > gate)) return chi_square;
-    error_ += (y / s) * cross;
-    // Also a row that informs of nothing stands in the joint gain.
     if (waiting_ == kCapacity) downdate();
-    applied_[std::size_t(waiting_)] = std::sqrt(information);
-    gains_.col(waiting_++) = cross / std::sqrt(s);
+    Sum<Scalar, B::Dim, Row<Scalar>::kMost + kCapacity> cross;
+    row.for_each([&](int i, Scalar h) { cross.add(h, &belief_.covariance(0, i)); });
+    Scalar innovation = residual - row.times(error_);
+    for (int k = 0; k < waiting_; ++k) {
+      const Waiting& before = rows_[std::size_t(k)];
+      const Scalar seen = row.times(crosses_.col(k));
+      cross.add(-seen * before.inverse_variance, &crosses_(0, k));
+      innovation -= seen * before.weight;
+    }
+    auto c = crosses_.col(waiting_);
+    cross.store(&c[0]);
+    const Scalar inverse_variance = 1 / (std::max(row.times(c), Scalar(0)) + variance);
+    const Scalar weight = innovation * inverse_variance;
+    const Scalar chi_square = innovation * weight;
+    if (!std::isfinite(chi_square) || (gate > 0 && chi_square > gate)) return chi_square;
+    // Also a row that informs of nothing stands in the joint gain.
+    rows_[std::size_t(waiting_++)] = {inverse_variance, weight, information};
     return chi_square;
   }
 
  private:
   static constexpr int kCapacity = 12;  // of three feet, and of nine cables
 
+  struct Waiting {
+    Scalar inverse_variance;  // 1/S
+    Scalar weight;            // y/S
+    Scalar information;       // part of the downdate that is applied
+  };
+
   void downdate() {
-    for (int k = 0; k < waiting_; ++k) gains_.col(k) *= applied_[std::size_t(k)];
-    subtract_outer(belief_.covariance, gains_, waiting_, B::Dim);
+    Sum<Scalar, B::Dim, kCapacity + 1> error;
+    error.add(Scalar(1), &error_[0]);
+    for (int k = 0; k < waiting_; ++k) {
+      error.add(rows_[std::size_t(k)].weight, &crosses_(0, k));
+    }
+    error.store(&error_[0]);
+    for (int k = 0; k < waiting_; ++k) {
+      const Waiting& row = rows_[std::size_t(k)];
+      crosses_.col(k) *= std::sqrt(row.information * row.inverse_variance);
+    }
+    subtract_outer(belief_.covariance, crosses_, waiting_, B::Dim);
     waiting_ = 0;
   }
 
   B& belief_;
-  typename B::ErrorVector error_ = B::ErrorVector::Zero();
-  Matrix<Scalar, B::Dim, kCapacity> gains_;
-  std::array<Scalar, kCapacity> applied_{};  // square root of the part of each that informs
+  typename B::ErrorVector error_ = B::ErrorVector::Zero();  // of the rows before those that wait
+  Matrix<Scalar, B::Dim, kCapacity> crosses_;               // c
+  std::array<Waiting, kCapacity> rows_;
   int waiting_ = 0;
 };
 
