@@ -1,0 +1,80 @@
+// Cases of a benchmark program. One binary does both: time, by Google Benchmark, and instructions,
+// when it runs under callgrind with `--count`.
+#pragma once
+
+#include <benchmark/benchmark.h>
+#include <valgrind/callgrind.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace tensegrity::benchmarks {
+
+// How a case repeats itself.
+struct Repeats {
+  int calls = 1;      // what one call of the case stands for: samples of a replay, for instance
+  int counted = 256;  // calls of the case that are counted under callgrind
+};
+
+// Hides from the optimiser what a case holds: the next call finds values it cannot foresee, and
+// everything the last one left has to be there.
+template <typename Case>
+void hide(Case& it) {
+  auto* address = &it;
+  benchmark::DoNotOptimize(address);
+  benchmark::ClobberMemory();
+}
+
+class Program {
+ public:
+  // Flags of Google Benchmark, `--count`, and whatever else is left: recordings.
+  Program(int argc, char** argv);
+
+  const std::vector<std::string>& recordings() const { return recordings_; }
+  bool counts() const { return counts_; }
+
+  // `prepare()` returns the call that is measured, with all that it needs inside.
+  template <typename Prepare>
+  void add(const std::string& name, const Prepare& prepare, const Repeats& repeats = {}) {
+    if (counts_) {
+      counted_.push_back({name, repeats, [prepare, repeats, name] {
+                            auto call = prepare();
+                            call();                             // what only the first call does
+                            CALLGRIND_DUMP_STATS_AT("before");  // a dump zeroes the counters
+                            for (int k = 0; k < repeats.counted; ++k) {
+                              hide(call);
+                              call();
+                            }
+                            hide(call);
+                            CALLGRIND_DUMP_STATS_AT(name.c_str());
+                          }});
+      return;
+    }
+    benchmark::RegisterBenchmark(name.c_str(), [prepare, repeats](benchmark::State& state) {
+      auto call = prepare();
+      for (auto _ : state) {
+        hide(call);
+        call();
+      }
+      hide(call);
+      state.counters["calls"] = repeats.calls;
+    });
+  }
+
+  // Measures all of it. Counting prints "<name> <calls>" a case, in the order of callgrind's dumps.
+  int run();
+
+ private:
+  struct Counted {
+    std::string name;
+    Repeats repeats;
+    std::function<void()> run;
+  };
+
+  std::vector<std::string> recordings_;
+  std::vector<Counted> counted_;
+  bool counts_ = false;
+};
+
+}  // namespace tensegrity::benchmarks
