@@ -1,0 +1,185 @@
+"""Run the replay in the emulator and on this machine, compare them, and table what it costs.
+
+    python check.py BUILD
+
+``BUILD`` holds ``recording.bin`` and the build directories ``host`` and, by the name of the board,
+those of the images (see the target ``firmware`` of the Makefile). The exit code is 1 when a limit of
+:data:`LIMITS` is missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import subprocess
+from collections import defaultdict
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+METHODS = ("paper", "full")
+BOARDS = {"mps2-an500": "Cortex-M7", "mps2-an386": "Cortex-M4F"}
+KIB = 1024
+
+FLASH_LIMIT = 192 * KIB
+RAM_LIMIT = 64 * KIB
+INSTRUCTION_LIMITS = {"paper": 200_000, "full": 800_000}
+"""Of one IMU cycle on the Cortex-M7: 0.5 ms and 2 ms of 5 ms at 400 MHz and one per clock."""
+POSITION_LIMIT = 0.01
+"""Distance of the final position to the one in double precision, as a share of the path."""
+COUNTER_RESOLUTION = 40
+"""Instructions in one count of the board's SysTick."""
+
+
+@dataclass
+class Replay:
+    """What one method printed: see ``replay/replay.hpp``."""
+
+    states: list[list[float]] = field(default_factory=list)
+    cycles: list[int] = field(default_factory=list)
+    start: int = 0
+    estimator: int = 0
+    stack: int = 0
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Of the IMU, once a second and at the end (N, 3) [m]."""
+        return np.array(self.states)[:, 1:4]
+
+    @property
+    def worst(self) -> int:
+        return max(self.start, *self.cycles)
+
+
+def parse(output: str) -> dict[str, Replay]:
+    """The replays in the output of an image or a program, by method."""
+    replays: dict[str, Replay] = defaultdict(Replay)
+    for line in output.splitlines():
+        what, method, *values = line.split()
+        if what == "calibration":
+            expected, measured = int(method), int(values[0])
+            if abs(measured - expected) > COUNTER_RESOLUTION:
+                raise SystemExit(f"{expected} instructions were counted as {measured}")
+        elif what == "state":
+            replays[method].states.append([float(v) for v in values])
+        elif what == "cycle":
+            replays[method].cycles.append(int(values[0]))
+        else:
+            setattr(replays[method], what, int(values[0]))
+    return replays
+
+
+def run(command: list[str | Path]) -> str:
+    result = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    if result.returncode != 0:
+        tail = "\n".join((result.stdout + result.stderr).splitlines()[-5:])
+        raise SystemExit(f"{command[0]} ended with {result.returncode}:\n{tail}")
+    return result.stdout
+
+
+def emulate(board: str, image: Path) -> dict[str, Replay]:
+    """Run an image. With ``-icount shift=0`` an instruction takes 1 ns of the emulated time."""
+    return parse(
+        run(
+            ["qemu-system-arm", "-M", board, "-icount", "shift=0", "-kernel", image]
+            + ["-nographic", "-monitor", "none", "-serial", "none", "-chardev", "stdio,id=out"]
+            + ["-semihosting-config", "enable=on,target=native,chardev=out"]
+        )
+    )
+
+
+def memory(image: Path) -> tuple[int, int]:
+    """Flash and static RAM [bytes]; the recording and the stack are not counted."""
+    sections = dict(re.findall(r"^\.(\S+)\s+(\d+)", run(["arm-none-eabi-size", "-A", image]), re.M))
+    text, data, bss = (int(sections[name]) for name in ("text", "data", "bss"))
+    return text + data, data + bss
+
+
+def double_routines(image: Path) -> list[str]:
+    """Routines of double precision that an image would have to emulate on a single-precision FPU."""
+    return re.findall(r"\b__aeabi_(?:d\w+|f2d|i2d|ui2d|l2d|ul2d)\b", run(["arm-none-eabi-nm", image]))
+
+
+def difference(replay: Replay, reference: Replay) -> float:
+    """Distance of the final positions over the path of the reference, whose chords of a second
+    make it shorter than it is."""
+    path = np.linalg.norm(np.diff(reference.positions, axis=0), axis=1).sum()
+    return float(np.linalg.norm(replay.positions[-1] - reference.positions[-1]) / path)
+
+
+class Limits:
+    """Collects what is beyond its limit."""
+
+    def __init__(self) -> None:
+        self.missed: list[str] = []
+
+    def check(self, what: str, value: float, limit: float) -> None:
+        if not value <= limit:
+            self.missed.append(f"{what}: {value:,.4g}, the limit is {limit:,.4g}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("build", type=Path)
+    build = parser.parse_args().build
+    limits = Limits()
+
+    recording = build / "recording.bin"
+    single = parse(run([build / "host" / "replay_float", recording]))
+    reference = parse(run([build / "host" / "replay_double", recording]))
+
+    sizes = Table("image", "flash [KiB]", "static RAM [KiB]", "stack [KiB]", "RAM [KiB]")
+    costs = Table("board", "method", "instructions: median", "worst", "of these at the start")
+    ends = Table("replay", "method", "final position", "from double precision [% of the path]")
+    for method in METHODS:
+        ends.add_row("host, double", method, position(reference[method]), "0")
+        share = difference(single[method], reference[method])
+        ends.add_row("host, float", method, position(single[method]), f"{100 * share:.4f}")
+        limits.check(f"host, {method}: final position", share, POSITION_LIMIT)
+
+    for board, core in BOARDS.items():
+        replays = emulate(board, build / board / "image_both.elf")
+        for image, methods in (("both", METHODS), *((method, (method,)) for method in METHODS)):
+            flash, static = memory(build / board / f"image_{image}.elf")
+            stack = max(replays[method].stack for method in methods)
+            sizes.add_row(
+                f"{core}, {image}", *(f"{n / KIB:.1f}" for n in (flash, static, stack, static + stack))
+            )
+            limits.check(f"{core}, {image}: flash", flash, FLASH_LIMIT)
+            limits.check(f"{core}, {image}: RAM", static + stack, RAM_LIMIT)
+        for method in METHODS:
+            replay = replays[method]
+            costs.add_row(
+                core,
+                method,
+                f"{np.median(replay.cycles):,.0f}",
+                f"{replay.worst:,}",
+                f"{replay.start:,}",
+            )
+            share = difference(replay, reference[method])
+            ends.add_row(core, method, position(replay), f"{100 * share:.4f}")
+            limits.check(f"{core}, {method}: final position", share, POSITION_LIMIT)
+            if core == "Cortex-M7":
+                limits.check(
+                    f"{core}, {method}: instructions", replay.worst, INSTRUCTION_LIMITS[method]
+                )
+    routines = double_routines(build / "mps2-an386" / "image_both.elf")
+    limits.check("emulated routines of double precision " + " ".join(routines), len(routines), 0)
+
+    console = Console(width=110)
+    for table in (sizes, costs, ends):
+        console.print(table)
+    for line in limits.missed:
+        console.print(line, style="red")
+    raise SystemExit(1 if limits.missed else 0)
+
+
+def position(replay: Replay) -> str:
+    return " ".join(f"{x:.4f}" for x in replay.positions[-1])
+
+
+if __name__ == "__main__":
+    main()
