@@ -11,7 +11,7 @@ JOBS ?= $(shell nproc)
 CPP_FILES := $(shell find cpp bindings tests/cpp benchmarks examples -name '*.hpp' -o -name '*.cpp' 2>/dev/null)
 SOURCES := $(shell find cpp bindings -type f) CMakeLists.txt pyproject.toml
 
-.PHONY: help setup demo test test-cpp test-python lint format stubs bench clean
+.PHONY: help setup demo test test-cpp test-python firmware lint format stubs bench clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -31,6 +31,23 @@ test-cpp: setup
 
 test-python: setup
 	$(BIN)/python -m pytest -n $(JOBS)
+
+# Images for both boards and the same replay on this machine; docs/firmware.md.
+FIRMWARE := build/firmware
+FIRMWARE_BOARDS := mps2-an500 mps2-an386
+
+firmware: setup ## the estimator on emulated Cortex-M boards, without a heap, against this machine
+	$(BIN)/python examples/firmware/make_recording.py $(FIRMWARE)/recording.bin
+	cmake -S examples/firmware -B $(FIRMWARE)/host -G Ninja -DCMAKE_BUILD_TYPE=Debug
+	cmake --build $(FIRMWARE)/host -j $(JOBS)
+	set -e; for board in $(FIRMWARE_BOARDS); do \
+	  cmake -S examples/firmware -B $(FIRMWARE)/$$board -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \
+	    --toolchain $(CURDIR)/examples/firmware/arm-none-eabi.cmake \
+	    -DBOARD=$$board -DRECORDING=$(CURDIR)/$(FIRMWARE)/recording.bin; \
+	  cmake --build $(FIRMWARE)/$$board -j $(JOBS); \
+	  ctest --test-dir $(FIRMWARE)/$$board --output-on-failure; \
+	done
+	$(BIN)/python examples/firmware/check.py $(FIRMWARE)
 
 lint: setup ## formatters, linters, type checker, stubs
 	$(BIN)/clang-format --dry-run --Werror $(CPP_FILES)

@@ -2,9 +2,9 @@
 
     python check.py BUILD
 
-``BUILD`` holds ``recording.bin`` and the build directories ``host`` and, by the name of the board,
-those of the images (see the target ``firmware`` of the Makefile). The exit code is 1 when a limit of
-:data:`LIMITS` is missed.
+``BUILD`` holds ``recording.bin`` and the build directories: ``host``, and by the names of the
+boards those of the images (target ``firmware`` of the Makefile). The exit code is 1 when one
+of the limits below is missed.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def parse(output: str) -> dict[str, Replay]:
     return replays
 
 
-def run(command: list[str | Path]) -> str:
+def run(*command: str | Path) -> str:
     result = subprocess.run(command, capture_output=True, text=True, timeout=600)
     if result.returncode != 0:
         tail = "\n".join((result.stdout + result.stderr).splitlines()[-5:])
@@ -82,25 +82,24 @@ def run(command: list[str | Path]) -> str:
 
 def emulate(board: str, image: Path) -> dict[str, Replay]:
     """Run an image. With ``-icount shift=0`` an instruction takes 1 ns of the emulated time."""
-    return parse(
-        run(
-            ["qemu-system-arm", "-M", board, "-icount", "shift=0", "-kernel", image]
-            + ["-nographic", "-monitor", "none", "-serial", "none", "-chardev", "stdio,id=out"]
-            + ["-semihosting-config", "enable=on,target=native,chardev=out"]
-        )
+    options = (
+        "-icount shift=0 -nographic -monitor none -serial none "
+        "-chardev stdio,id=out -semihosting-config enable=on,target=native,chardev=out"
     )
+    return parse(run("qemu-system-arm", "-M", board, "-kernel", image, *options.split()))
 
 
 def memory(image: Path) -> tuple[int, int]:
     """Flash and static RAM [bytes]; the recording and the stack are not counted."""
-    sections = dict(re.findall(r"^\.(\S+)\s+(\d+)", run(["arm-none-eabi-size", "-A", image]), re.M))
+    sections = dict(re.findall(r"^\.(\S+)\s+(\d+)", run("arm-none-eabi-size", "-A", image), re.M))
     text, data, bss = (int(sections[name]) for name in ("text", "data", "bss"))
     return text + data, data + bss
 
 
 def double_routines(image: Path) -> list[str]:
-    """Routines of double precision that an image would have to emulate on a single-precision FPU."""
-    return re.findall(r"\b__aeabi_(?:d\w+|f2d|i2d|ui2d|l2d|ul2d)\b", run(["arm-none-eabi-nm", image]))
+    """What an image holds to emulate double precision on an FPU of single precision."""
+    symbols = run("arm-none-eabi-nm", image)
+    return re.findall(r"\b__aeabi_(?:d\w+|f2d|i2d|ui2d|l2d|ul2d)\b", symbols)
 
 
 def difference(replay: Replay, reference: Replay) -> float:
@@ -128,8 +127,8 @@ def main() -> None:
     limits = Limits()
 
     recording = build / "recording.bin"
-    single = parse(run([build / "host" / "replay_float", recording]))
-    reference = parse(run([build / "host" / "replay_double", recording]))
+    single = parse(run(build / "host" / "replay_float", recording))
+    reference = parse(run(build / "host" / "replay_double", recording))
 
     sizes = Table("image", "flash [KiB]", "static RAM [KiB]", "stack [KiB]", "RAM [KiB]")
     costs = Table("board", "method", "instructions: median", "worst", "of these at the start")
@@ -145,9 +144,8 @@ def main() -> None:
         for image, methods in (("both", METHODS), *((method, (method,)) for method in METHODS)):
             flash, static = memory(build / board / f"image_{image}.elf")
             stack = max(replays[method].stack for method in methods)
-            sizes.add_row(
-                f"{core}, {image}", *(f"{n / KIB:.1f}" for n in (flash, static, stack, static + stack))
-            )
+            row = (flash, static, stack, static + stack)
+            sizes.add_row(f"{core}, {image}", *(f"{size / KIB:.1f}" for size in row))
             limits.check(f"{core}, {image}: flash", flash, FLASH_LIMIT)
             limits.check(f"{core}, {image}: RAM", static + stack, RAM_LIMIT)
         for method in METHODS:
