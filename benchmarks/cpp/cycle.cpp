@@ -157,7 +157,7 @@ int main(int argc, char** argv) {
     if (each) {
       print_each<Filter>(name, folder, last ? "" : ",");
     } else if (program.counts()) {
-      count_each<Filter>(name, folder);
+      if (program.wants(name)) count_each<Filter>(name, folder);
     } else {
       add_case<Filter>(program, name, folder);
     }

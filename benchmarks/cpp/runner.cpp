@@ -8,6 +8,7 @@ namespace tensegrity::benchmarks {
 
 Program::Program(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
+  filter_ = benchmark::GetBenchmarkFilter();
   for (int k = 1; k < argc; ++k) {
     if (std::strcmp(argv[k], "--count") == 0) {
       counts_ = true;

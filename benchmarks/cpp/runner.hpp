@@ -6,6 +6,7 @@
 #include <valgrind/callgrind.h>
 
 #include <functional>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -34,12 +35,14 @@ class Program {
 
   const std::vector<std::string>& recordings() const { return recordings_; }
   bool counts() const { return counts_; }
+  // Whether `--benchmark_filter` asks for this case. Google Benchmark sees to it for times.
+  bool wants(const std::string& name) const { return std::regex_search(name, filter_); }
 
   // `prepare()` returns the call that is measured, with all that it needs inside.
   template <typename Prepare>
   void add(const std::string& name, const Prepare& prepare, const Repeats& repeats = {}) {
     if (counts_) {
-      if (repeats.counted == 0) return;
+      if (repeats.counted == 0 || !wants(name)) return;
       counted_.push_back({name, repeats, [prepare, repeats, name] {
                             auto call = prepare();
                             call();                             // what only the first call does
@@ -78,6 +81,7 @@ class Program {
   std::vector<std::string> recordings_;
   std::vector<Counted> counted_;
   bool counts_ = false;
+  std::regex filter_;
 };
 
 }  // namespace tensegrity::benchmarks

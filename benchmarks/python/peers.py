@@ -255,7 +255,11 @@ def unscented() -> list[Case]:
             "ours.predict(turn, noise); ours.correct(beacons, z, variances)",
             shared | {"ours": ours},
         ),
-        Case("peers/unscented/filterpy", "theirs.predict(); theirs.update(z)", {"theirs": theirs, "z": z}),
+        Case(
+            "peers/unscented/filterpy",
+            "theirs.predict(); theirs.update(z)",
+            {"theirs": theirs, "z": z},
+        ),
     ]
 
 

@@ -63,7 +63,9 @@ def streams(sequence: Sequence) -> list[Case]:
     """The recording sample by sample; contacts and cables at stamps of the IMU."""
     imu, contacts = sequence.imu, sequence.contacts
     samples = list(zip(imu.t_ns.tolist(), imu.gyro, imu.accel, strict=True))
-    flags = {} if contacts is None else dict(zip(contacts.t_ns.tolist(), contacts.flags, strict=True))
+    flags = (
+        {} if contacts is None else dict(zip(contacts.t_ns.tolist(), contacts.flags, strict=True))
+    )
     lengths = dict(zip(sequence.cables.t_ns.tolist(), sequence.cables.lengths, strict=True))
     return [
         Case(
