@@ -54,6 +54,7 @@ lint: setup ## formatters, linters, type checker, stubs
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/python benchmarks/report.py --check
 	$(BIN)/python bindings/make_stubs.py build/_core.pyi
 	diff -u python/tensegrity/_core.pyi build/_core.pyi
 
@@ -65,8 +66,8 @@ format: setup ## format all code
 stubs: setup ## write python/tensegrity/_core.pyi from the built module
 	$(BIN)/python bindings/make_stubs.py python/tensegrity/_core.pyi
 
-bench: setup ## microbenchmarks (benchmarks/imu_cycle.cpp: those of C++ alone)
-	$(BIN)/python benchmarks/estimator.py
+bench: $(VENV)/.bench ## times and instructions, peers beside them: docs/benchmarks.md
+	JOBS=$(JOBS) $(BIN)/python benchmarks/run.py
 
 clean: ## remove builds and the virtual environment
 	rm -rf build $(VENV) runs
@@ -89,4 +90,8 @@ $(VENV)/bin/pip: build/.debian
 $(VENV)/.installed: $(SOURCES) $(VENV)/bin/pip
 	$(BIN)/pip install --quiet "scikit-build-core>=0.10" "pybind11>=3.0" "numpy>=1.26"
 	CMAKE_BUILD_PARALLEL_LEVEL=$(JOBS) $(BIN)/pip install --quiet --no-build-isolation -e '.[dev]'
+	@touch $@
+
+$(VENV)/.bench: $(VENV)/.installed
+	$(BIN)/pip install --quiet --no-build-isolation -e '.[bench]'
 	@touch $@
