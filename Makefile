@@ -38,10 +38,10 @@ FIRMWARE_BOARDS := mps2-an500 mps2-an386
 
 firmware: setup ## the estimator on emulated Cortex-M boards, without a heap, against this machine
 	$(BIN)/python examples/firmware/make_recording.py $(FIRMWARE)/recording.bin
-	cmake -S examples/firmware -B $(FIRMWARE)/host -G Ninja -DCMAKE_BUILD_TYPE=Debug
+	cmake -S examples/firmware -B $(FIRMWARE)/host -G Ninja
 	cmake --build $(FIRMWARE)/host -j $(JOBS)
 	set -e; for board in $(FIRMWARE_BOARDS); do \
-	  cmake -S examples/firmware -B $(FIRMWARE)/$$board -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \
+	  cmake -S examples/firmware -B $(FIRMWARE)/$$board -G Ninja \
 	    --toolchain $(CURDIR)/examples/firmware/arm-none-eabi.cmake \
 	    -DBOARD=$$board -DRECORDING=$(CURDIR)/$(FIRMWARE)/recording.bin; \
 	  cmake --build $(FIRMWARE)/$$board -j $(JOBS); \

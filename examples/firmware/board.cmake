@@ -4,6 +4,7 @@ enable_testing()
 
 set(BOARD mps2-an500 CACHE STRING "mps2-an500 (Cortex-M7) or mps2-an386 (Cortex-M4F)")
 set(RECORDING "" CACHE FILEPATH "What make_recording.py has written")
+set(OPTIMISATION -O2 CACHE STRING "-Os, -O2 or -O3: docs/firmware.md compares them")
 if(NOT EXISTS "${RECORDING}")
   message(FATAL_ERROR "RECORDING: no file '${RECORDING}'; write one with make_recording.py")
 endif()
@@ -15,7 +16,7 @@ if(NOT DEFINED cpu_${BOARD})
 endif()
 
 target_compile_options(firmware_options INTERFACE
-  ${cpu_${BOARD}} -mthumb -mfloat-abi=hard --specs=nano.specs
+  ${cpu_${BOARD}} -mthumb -mfloat-abi=hard --specs=nano.specs ${OPTIMISATION} -DNDEBUG
   -ffunction-sections -fdata-sections
   # sqrt is one instruction when nobody reads errno
   -fno-math-errno
