@@ -5,6 +5,7 @@
 // two endcaps, the endcaps of a free rod move by dc +- across (L/2 du).
 #pragma once
 
+#include "tensegrity/shape/cables.hpp"
 #include "tensegrity/shape/gauge.hpp"
 
 namespace tensegrity::shape {
