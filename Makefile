@@ -8,10 +8,10 @@ BUILD := build/cpp
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 # Memory, not cores, limits parallel Eigen builds: about 1.5 GB a job.
 JOBS ?= $(shell nproc)
-CPP_FILES := $(shell find cpp bindings tests/cpp benchmarks examples -name '*.hpp' -o -name '*.cpp' 2>/dev/null)
+CPP_FILES := $(shell find cpp bindings tests benchmarks examples -name '*.hpp' -o -name '*.cpp' -o -name '*.h' -o -name '*.c' 2>/dev/null)
 SOURCES := $(shell find cpp bindings -type f) CMakeLists.txt pyproject.toml
 
-.PHONY: help setup demo test test-cpp test-python firmware lint format stubs bench clean
+.PHONY: help setup demo test test-cpp test-python test-install test-aarch64 warnings firmware lint format stubs bench clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -23,11 +23,38 @@ demo: setup ## simulate, estimate with both methods, evaluate, draw
 
 test: test-cpp test-python ## all tests
 
-test-cpp: setup
-	cmake -S . -B $(BUILD) -G Ninja -DCMAKE_BUILD_TYPE=Release -DTENSEGRITY_BUILD_TESTS=ON -DTENSEGRITY_BUILD_EXAMPLES=ON > $(BUILD).log 2>&1 \
-	  || { cat $(BUILD).log; exit 1; }
+# The examples are built and run by test-install.
+test-cpp: $(BUILD)/build.ninja
 	cmake --build $(BUILD) -j $(JOBS)
 	ctest --test-dir $(BUILD) --output-on-failure
+
+$(BUILD)/build.ninja: $(VENV)/.installed
+	cmake -S . -B $(BUILD) -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS_RELEASE='-O2 -DNDEBUG' \
+	  -DTENSEGRITY_BUILD_C=ON -DTENSEGRITY_BUILD_TESTS=ON > $(BUILD).log 2>&1 || { cat $(BUILD).log; exit 1; }
+	@touch $@
+
+test-install: $(BUILD)/build.ninja ## the installed tree: CMake, pkg-config, C, all examples
+	cmake --build $(BUILD) -j $(JOBS) --target tensegrity_ipopt tensegrity_c
+	rm -rf $(BUILD)/recording
+	$(BIN)/tensegrity simulate forward --path-length 0.5 --out $(BUILD)/recording
+	JOBS=$(JOBS) tests/packaging/test_install.sh $(BUILD) $(BUILD)/recording
+
+warnings: build/.debian ## no warning in headers and libraries, g++ and clang++
+	tests/packaging/warnings.sh $(JOBS)
+
+# A part of the tests: the whole of them (AARCH64_TESTS='.*') compiles for a quarter of an hour.
+AARCH64 := build/aarch64
+AARCH64_TESTS ?= math.*|chi_square|shape_solver|shape_geometry|tight_update|tight_propagate|estimator_tight
+
+test-aarch64: build/.debian ## core in double and C library in float on emulated 64-bit ARM
+	@mkdir -p $(AARCH64)
+	cmake -S . -B $(AARCH64) -G Ninja --toolchain cpp/cmake/aarch64-linux-gnu.cmake \
+	  -DCMAKE_BUILD_TYPE= -DCMAKE_CXX_FLAGS=-O1 -DTENSEGRITY_BUILD_IPOPT=OFF \
+	  -DTENSEGRITY_BUILD_C=ON -DTENSEGRITY_C_SCALAR=float \
+	  -DTENSEGRITY_BUILD_TESTS=ON -DTENSEGRITY_TESTS='$(AARCH64_TESTS)' > $(AARCH64).log 2>&1 \
+	  || { cat $(AARCH64).log; exit 1; }
+	cmake --build $(AARCH64) -j $(JOBS)
+	ctest --test-dir $(AARCH64) --output-on-failure
 
 test-python: setup
 	$(BIN)/python -m pytest -n $(JOBS)
