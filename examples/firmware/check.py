@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 METHODS = ("paper", "full")
 BOARDS = {"mps2-an500": "Cortex-M7", "mps2-an386": "Cortex-M4F"}
@@ -69,6 +69,9 @@ def parse(output: str) -> dict[str, Replay]:
             replays[method].cycles.append(int(values[0]))
         else:
             setattr(replays[method], what, int(values[0]))
+    for method in METHODS:
+        if not replays[method].states:
+            raise SystemExit(f"{method} has not started")
     return replays
 
 
@@ -120,6 +123,15 @@ class Limits:
             self.missed.append(f"{what}: {value:,.4g}, the limit is {limit:,.4g}")
 
 
+def table(first: str, *numbers: str) -> Table:
+    """A table to print, with columns of numbers."""
+    return Table(first, *(Column(number, justify="right") for number in numbers))
+
+
+def position(replay: Replay) -> str:
+    return " ".join(f"{x:.4f}" for x in replay.positions[-1])
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("build", type=Path)
@@ -130,13 +142,13 @@ def main() -> None:
     single = parse(run(build / "host" / "replay_float", recording))
     reference = parse(run(build / "host" / "replay_double", recording))
 
-    sizes = Table("image", "flash [KiB]", "static RAM [KiB]", "stack [KiB]", "RAM [KiB]")
-    costs = Table("board", "method", "instructions: median", "worst", "of these at the start")
-    ends = Table("replay", "method", "final position", "from double precision [% of the path]")
+    sizes = table("image", "flash [KiB]", "static RAM [KiB]", "stack [KiB]", "RAM [KiB]")
+    costs = table("instructions per IMU cycle", "median", "worst", "start")
+    ends = table("final position [m]", "x, y, z", "off double precision [% of the path]")
     for method in METHODS:
-        ends.add_row("host, double", method, position(reference[method]), "0")
+        ends.add_row(f"host in double precision, {method}", position(reference[method]))
         share = difference(single[method], reference[method])
-        ends.add_row("host, float", method, position(single[method]), f"{100 * share:.4f}")
+        ends.add_row(f"host, {method}", position(single[method]), f"{100 * share:.3f}")
         limits.check(f"host, {method}: final position", share, POSITION_LIMIT)
 
     for board, core in BOARDS.items():
@@ -150,15 +162,10 @@ def main() -> None:
             limits.check(f"{core}, {image}: RAM", static + stack, RAM_LIMIT)
         for method in METHODS:
             replay = replays[method]
-            costs.add_row(
-                core,
-                method,
-                f"{np.median(replay.cycles):,.0f}",
-                f"{replay.worst:,}",
-                f"{replay.start:,}",
-            )
+            counts = (np.median(replay.cycles), replay.worst, replay.start)
+            costs.add_row(f"{core}, {method}", *(f"{count:,.0f}" for count in counts))
             share = difference(replay, reference[method])
-            ends.add_row(core, method, position(replay), f"{100 * share:.4f}")
+            ends.add_row(f"{core}, {method}", position(replay), f"{100 * share:.3f}")
             limits.check(f"{core}, {method}: final position", share, POSITION_LIMIT)
             if core == "Cortex-M7":
                 limits.check(
@@ -167,16 +174,12 @@ def main() -> None:
     routines = double_routines(build / "mps2-an386" / "image_both.elf")
     limits.check("emulated routines of double precision " + " ".join(routines), len(routines), 0)
 
-    console = Console(width=110)
-    for table in (sizes, costs, ends):
-        console.print(table)
+    console = Console(width=100)
+    for printed in (sizes, costs, ends):
+        console.print(printed)
     for line in limits.missed:
         console.print(line, style="red")
     raise SystemExit(1 if limits.missed else 0)
-
-
-def position(replay: Replay) -> str:
-    return " ".join(f"{x:.4f}" for x in replay.positions[-1])
 
 
 if __name__ == "__main__":
