@@ -10,9 +10,11 @@ of the limits below is missed.
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import subprocess
 from collections import defaultdict
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -83,13 +85,13 @@ def run(*command: str | Path) -> str:
     return result.stdout
 
 
-def emulate(board: str, image: Path) -> dict[str, Replay]:
-    """Run an image. With ``-icount shift=0`` an instruction takes 1 ns of the emulated time."""
+def emulate(board: str, image: Path) -> str:
+    """Output of an image. With ``-icount shift=0`` an instruction takes 1 ns of emulated time."""
     options = (
         "-icount shift=0 -nographic -monitor none -serial none "
         "-chardev stdio,id=out -semihosting-config enable=on,target=native,chardev=out"
     )
-    return parse(run("qemu-system-arm", "-M", board, "-kernel", image, *options.split()))
+    return run("qemu-system-arm", "-M", board, "-kernel", image, *options.split())
 
 
 def memory(image: Path) -> tuple[int, int]:
@@ -139,8 +141,15 @@ def main() -> None:
     limits = Limits()
 
     recording = build / "recording.bin"
-    single = parse(run(build / "host" / "replay_float", recording))
-    reference = parse(run(build / "host" / "replay_double", recording))
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        on_host = [
+            pool.submit(run, build / "host" / f"replay_{scalar}", recording)
+            for scalar in ("float", "double")
+        ]
+        on_board = {
+            board: pool.submit(emulate, board, build / board / "image_both.elf") for board in BOARDS
+        }
+    single, reference = (parse(program.result()) for program in on_host)
 
     sizes = table("image", "flash [KiB]", "static RAM [KiB]", "stack [KiB]", "RAM [KiB]")
     costs = table("instructions per IMU cycle", "median", "worst", "start")
@@ -152,7 +161,7 @@ def main() -> None:
         limits.check(f"host, {method}: final position", share, POSITION_LIMIT)
 
     for board, core in BOARDS.items():
-        replays = emulate(board, build / board / "image_both.elf")
+        replays = parse(on_board[board].result())
         for image, methods in (("both", METHODS), *((method, (method,)) for method in METHODS)):
             flash, static = memory(build / board / f"image_{image}.elf")
             stack = max(replays[method].stack for method in methods)

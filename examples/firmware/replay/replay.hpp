@@ -67,7 +67,7 @@ template <typename Filter>
     imu_cycle(estimator, imu, contacts, cables, recording);
     const std::uint32_t cost = platform::instructions(begin, platform::now());
     if (!estimator.initialized()) continue;
-    print_count(started ? "cycle" : "start", method, cost);
+    if (cost > 0) print_count(started ? "cycle" : "start", method, cost);
     const bool last = &imu + 1 == recording.imu.end();
     if (imu.t % kSecond == 0 || last) print_state(method, estimator.state());
   }
