@@ -3,7 +3,7 @@
     python benchmarks/python/peers.py ../shared/data/prism3/right
 
 - one IMU sample and one correction with 1, 3 and 6 contacts: GTSAM's LeggedInvariantEKF. Its biases
-  are fixed and it has no spin: 9 + 3 N errors against 16 + 3 N here
+  are fixed and it has no spin: 9 + 3 N errors, 16 + 3 N here
 - nine cable lengths to a shape: SciPy's `least_squares` and CasADi with Ipopt, from the last
   solution. CasADi brings its own Ipopt; Debian's is the one of `tensegrity.IpoptSolver`
 - an update of an unscented filter with a process in NumPy: FilterPy
@@ -41,7 +41,7 @@ CONTACTS = (1, 3, 6)
 FEET = (1, 3, 5, 0, 2, 4)
 """Endcaps in the order in which they are put on the ground."""
 DT, GRAVITY = 0.005, 9.81
-GYRO_STD, ACCEL_STD, CONTACT_STD, FOOT_WALK = 0.002, 0.043, 0.05, 0.05
+GYRO_STD, ACCEL_STD, CONTACT_STD, FOOT_WALK, SPIN_WALK = 0.002, 0.043, 0.05, 0.05, 0.1
 SHAPES = 40
 """Consecutive samples of a rolling robot; a repeat goes through all of them."""
 CABLES = ((0, 4), (0, 2), (2, 4), (1, 5), (1, 3), (3, 5), (1, 4), (0, 3), (2, 5))
@@ -50,59 +50,61 @@ CABLES = ((0, 4), (0, 2), (2, 4), (1, 5), (1, 3), (3, 5), (1, 4), (0, 3), (2, 5)
 # --- contact-aided invariant filter -------------------------------------------------------------
 
 
-def filters() -> list[Case]:
-    """A robot that stands still, called as each package is meant to be called from Python."""
+def filters() -> dict[str, list[float]]:
+    """A robot that stands still, called as each package is meant to be called from Python.
+
+    Corrections without a sample in between would wear out the covariance: what is timed is both,
+    and the correction is the difference.
+    """
     gyro, accel = np.zeros(3), np.array([0.0, 0.0, GRAVITY])
     endcaps = np.ascontiguousarray(_core.Prism().undeformed())
     cases = []
     for contacts in CONTACTS:
         feet = FEET[:contacts]
-        ours = _core.InvariantFilter()
-        ours.covariance = 1e-4 * np.eye(16)
-        for foot in feet:
-            ours.augment(foot, endcaps[foot], CONTACT_STD**2 * np.eye(3))
-        cases.append(
-            Case(
-                f"peers/propagate/{contacts}/tensegrity",
-                "propagate(gyro, accel, dt, gyro_std=gyro_std, accel_std=accel_std)",
-                {
-                    "propagate": ours.propagate,
-                    "gyro": gyro,
-                    "accel": accel,
-                    "dt": DT,
-                    "gyro_std": GYRO_STD,
-                    "accel_std": ACCEL_STD,
-                },
-            )
-        )
-        cases.append(
-            Case(
-                f"peers/correct/{contacts}/tensegrity",
-                "correct(h, covariance)",
-                {
-                    "correct": ours.correct_contacts,
-                    "h": endcaps,
-                    "covariance": CONTACT_STD**2 * np.eye(18),
-                },
-            )
-        )
         theirs = legged_filter(feet, endcaps)
         measurements = [contact(k, endcaps[foot]) for k, foot in enumerate(feet)]
-        cases.append(
-            Case(
-                f"peers/propagate/{contacts}/gtsam",
-                "predict(gyro, accel, dt)",
-                {"predict": theirs.predict, "gyro": gyro, "accel": accel, "dt": DT},
+        motion = {"gyro": gyro, "accel": accel, "dt": DT}
+        ours = {
+            "filter": standing_filter(feet, endcaps),
+            "noise": _core.FilterNoise(
+                gyro_std=GYRO_STD, accel_std=ACCEL_STD, anchor_walk=FOOT_WALK, spin_walk=SPIN_WALK
+            ),
+            "h": endcaps,
+            "covariance": CONTACT_STD**2 * np.eye(18),
+        }
+        for package, predict, correct, names in (
+            (
+                "tensegrity",
+                "filter.propagate(gyro, accel, dt, noise)",
+                "filter.correct_contacts(h, covariance)",
+                ours,
+            ),
+            (
+                "gtsam",
+                "filter.predict(gyro, accel, dt)",
+                "filter.processContacts(measurements)",
+                {"filter": theirs, "measurements": measurements},
+            ),
+        ):
+            both = f"{predict}; {correct}"
+            cases.append(Case(f"both/{contacts}/{package}", both, motion | names))
+            cases.append(
+                Case(f"peers/propagate/{contacts}/{package}", predict, motion | names, setup=both)
             )
-        )
-        cases.append(
-            Case(
-                f"peers/correct/{contacts}/gtsam",
-                "correct(measurements)",
-                {"correct": theirs.processContacts, "measurements": measurements},
-            )
-        )
-    return cases
+    times = measure(cases)
+    for name in [name for name in times if name.startswith("both/")]:
+        case = name.removeprefix("both/")
+        pairs = zip(times.pop(name), times[f"peers/propagate/{case}"], strict=True)
+        times[f"peers/correct/{case}"] = [both - propagate for both, propagate in pairs]
+    return times
+
+
+def standing_filter(feet: tuple[int, ...], endcaps: Array) -> _core.InvariantFilter:
+    filter_ = _core.InvariantFilter()
+    filter_.covariance = 1e-4 * np.eye(16)
+    for foot in feet:
+        filter_.augment(foot, endcaps[foot], CONTACT_STD**2 * np.eye(3))
+    return filter_
 
 
 def legged_filter(feet: tuple[int, ...], endcaps: Array) -> gtsam.LeggedInvariantEKF:
@@ -306,8 +308,8 @@ def main() -> None:
     )
     parser.add_argument("recording", type=Path)
     arguments = parser.parse_args()
-    times: dict[str, list[float]] = {}
-    for cases in (filters(), shapes(read(arguments.recording)), unscented(), orientation()):
+    times = filters()
+    for cases in (shapes(read(arguments.recording)), unscented(), orientation()):
         times |= measure(cases)
     packages = ("gtsam", "casadi", "scipy", "filterpy", "ahrs", "numpy")
     versions = {name: version(name) for name in packages}
