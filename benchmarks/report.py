@@ -98,11 +98,11 @@ class Page:
     def worst(self) -> str:
         rows = []
         for method in METHODS:
-            kinds: dict[str, int] = {}
+            kinds: dict[str, float] = {}
             for case, calls in self._results.worst_instructions.items():
                 if case.startswith(f"cycle/{method}/"):
                     for kind, count in calls.items():
-                        kinds[kind] = max(kinds.get(kind, 0), count)
+                        kinds[kind] = max(kinds.get(kind, 0.0), count)
             rows.append(
                 [method, *(thousands(kinds[k]) for k in ("imu", "cables", "contacts", "cycle"))]
             )

@@ -42,7 +42,7 @@ class Results:
     """``median_ns`` and ``worst_ns`` of single cycles by case."""
     instructions: dict[str, float] = field(default_factory=dict)
     """Of one call, by case."""
-    worst_instructions: dict[str, dict[str, int]] = field(default_factory=dict)
+    worst_instructions: dict[str, dict[str, float]] = field(default_factory=dict)
     """Of the worst ``imu``, ``contacts``, ``cables`` and ``cycle``, by case."""
 
     def write(self, path: Path = RESULTS) -> None:

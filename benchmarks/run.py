@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 import report
-from callgrind import dumps, worst_calls
+from callgrind import Counts, counts, worst_calls
 from results import Results, Timing
 
 import tensegrity.sequence
@@ -42,7 +42,7 @@ TIMING = (
     "--benchmark_min_time=0.1",
     "--benchmark_enable_random_interleaving=true",
 )
-COUNTING = ("valgrind", "-q", "--tool=callgrind", "--combine-dumps=yes")
+COUNTING = ("valgrind", "-q", "--tool=callgrind", "--callgrind-out-file=/dev/null")
 
 PROGRAMS = ("filter", "tight", "shape", "contact", "cycle", "dynamics", "unscented")
 WITH_RECORDINGS = ("shape", "contact", "cycle")
@@ -139,27 +139,24 @@ def time_python(name: str, paths: list[Path]) -> dict[str, Any]:
     }
 
 
-def callgrind(where: Build, name: str, out: Path, *arguments: str) -> str:
-    out.unlink(missing_ok=True)
-    return run([*COUNTING, f"--callgrind-out-file={out}", str(where.program(name)), *arguments,
-                "--count"])  # fmt: skip
+def count(where: Build, name: str, log: Path, *arguments: str) -> Counts:
+    """What a program counts under callgrind."""
+    program = [str(where.program(name)), *arguments, "--count"]
+    return counts(log, run([*COUNTING, f"--log-file={log}", *program]))
 
 
 def count_program(where: Build, name: str, paths: list[Path]) -> dict[str, Any]:
     """Instructions per call of each case."""
-    out = where.folder / f"{name}.callgrind"
-    output = callgrind(where, name, out, *(map(str, paths) if name in WITH_RECORDINGS else ()))
-    calls = {case: int(count) for case, count in map(str.split, output.splitlines())}
-    return {"instructions": {case: total / calls[case] for case, total in dumps(out)}}
+    log = where.folder / f"{name}.callgrind.log"
+    arguments = map(str, paths) if name in WITH_RECORDINGS else ()
+    return {"instructions": dict(count(where, name, log, *arguments))}
 
 
 def count_cycles(where: Build, method: str, paths: list[Path]) -> dict[str, Any]:
     """Instructions of the worst calls of a method."""
-    out = where.folder / f"cycle-{method}.callgrind"
-    callgrind(where, "cycle", out, *map(str, paths), f"--benchmark_filter=^cycle/{method}/")
-    worst = worst_calls(out)
-    out.unlink()  # hundreds of megabytes
-    return {"worst_instructions": worst}
+    log = where.folder / f"cycle-{method}.callgrind.log"
+    wanted = f"--benchmark_filter=^cycle/{method}/"
+    return {"worst_instructions": worst_calls(count(where, "cycle", log, *map(str, paths), wanted))}
 
 
 # --- machine ------------------------------------------------------------------------------------
@@ -270,7 +267,7 @@ def measure(where: Build, resume: bool) -> Results:
         keep(stages.run("time-calibration", lambda: time_python("calibration.py", ranges)))
     results.machine["load after"] = load()
     # Counts do not care.
-    counts: dict[str, Callable[[], dict[str, Any]]] = {
+    counting_stages: dict[str, Callable[[], dict[str, Any]]] = {
         **{
             f"count-cycles-{method}": lambda method=method: count_cycles(counting, method, paths)
             for method in COUNTED_CYCLES
@@ -281,7 +278,7 @@ def measure(where: Build, resume: bool) -> Results:
         },
     }
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for stored in pool.map(stages.run, counts.keys(), counts.values()):
+        for stored in pool.map(stages.run, counting_stages.keys(), counting_stages.values()):
             keep(stored)
     return results
 

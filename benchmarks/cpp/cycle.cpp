@@ -111,23 +111,24 @@ void print_each(const std::string& name, const std::string& folder, const char* 
               least[least.size() / 2], least.back(), end);
 }
 
-// One dump of callgrind's counters for every call.
+// Every call by itself.
 template <typename Filter>
-void count_each(const std::string& name, const std::string& folder) {
+void count_each(const Program& program, const std::string& name, const std::string& folder) {
   const Replay<Filter> replay(folder);
-  const std::string imu = name + "/imu", contacts = name + "/contacts", cables = name + "/cables";
   auto estimator = replay.at_start;
-  CALLGRIND_DUMP_STATS_AT("before");  // a dump zeroes the counters
+  const auto count = [&](const char* kind, const auto& call) {
+    benchmarks::mark();
+    call();
+    benchmarks::mark();
+    program.marked(name + "/" + kind, 1);
+  };
   for (const Cycle& cycle : replay.cycles) {
-    estimator.imu(cycle.t, cycle.gyro, cycle.accel);
-    CALLGRIND_DUMP_STATS_AT(imu.c_str());
+    count("imu", [&] { estimator.imu(cycle.t, cycle.gyro, cycle.accel); });
     if (cycle.has_contacts) {
-      estimator.contacts(cycle.contacts_t, cycle.flags);
-      CALLGRIND_DUMP_STATS_AT(contacts.c_str());
+      count("contacts", [&] { estimator.contacts(cycle.contacts_t, cycle.flags); });
     }
     if (cycle.has_cables) {
-      estimator.cables(cycle.cables_t, cycle.lengths);
-      CALLGRIND_DUMP_STATS_AT(cables.c_str());
+      count("cables", [&] { estimator.cables(cycle.cables_t, cycle.lengths); });
     }
   }
 }
@@ -157,7 +158,7 @@ int main(int argc, char** argv) {
     if (each) {
       print_each<Filter>(name, folder, last ? "" : ",");
     } else if (program.counts()) {
-      if (program.wants(name)) count_each<Filter>(name, folder);
+      if (program.wants(name)) count_each<Filter>(program, name, folder);
     } else {
       add_case<Filter>(program, name, folder);
     }

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <benchmark/benchmark.h>
-#include <valgrind/callgrind.h>
+#include <valgrind/valgrind.h>
 
 #include <functional>
 #include <regex>
@@ -28,6 +28,9 @@ void hide(Case& it) {
   benchmark::ClobberMemory();
 }
 
+// Has callgrind write its counter of instructions to its log.
+inline void mark() { VALGRIND_MONITOR_COMMAND("status internal"); }
+
 class Program {
  public:
   // Flags of Google Benchmark, `--count`, and whatever else is left: recordings.
@@ -43,17 +46,18 @@ class Program {
   void add(const std::string& name, const Prepare& prepare, const Repeats& repeats = {}) {
     if (counts_) {
       if (repeats.counted == 0 || !wants(name)) return;
-      counted_.push_back({name, repeats, [prepare, repeats, name] {
-                            auto call = prepare();
-                            call();                             // what only the first call does
-                            CALLGRIND_DUMP_STATS_AT("before");  // a dump zeroes the counters
-                            for (int k = 0; k < repeats.counted; ++k) {
-                              hide(call);
-                              call();
-                            }
-                            hide(call);
-                            CALLGRIND_DUMP_STATS_AT(name.c_str());
-                          }});
+      counted_.push_back([this, prepare, repeats, name] {
+        auto call = prepare();
+        call();  // what only the first call does
+        mark();
+        for (int k = 0; k < repeats.counted; ++k) {
+          hide(call);
+          call();
+        }
+        hide(call);
+        mark();
+        marked(name, repeats.calls * repeats.counted);
+      });
       return;
     }
     benchmark::RegisterBenchmark(name.c_str(), [prepare, repeats](benchmark::State& state) {
@@ -68,18 +72,15 @@ class Program {
     });
   }
 
-  // Measures all of it. Counting prints "<name> <calls>" a case, in the order of callgrind's dumps.
+  // What was between the last two marks: a line of the output.
+  void marked(const std::string& name, int calls) const;
+
+  // Measures all of it.
   int run();
 
  private:
-  struct Counted {
-    std::string name;
-    Repeats repeats;
-    std::function<void()> run;
-  };
-
   std::vector<std::string> recordings_;
-  std::vector<Counted> counted_;
+  std::vector<std::function<void()>> counted_;
   bool counts_ = false;
   std::regex filter_;
 };

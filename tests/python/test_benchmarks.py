@@ -16,27 +16,22 @@ def _benchmarks_on_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.delitem(sys.modules, name, raising=False)
 
 
-def dump(name: str, instructions: int) -> str:
-    return (
-        f"desc: Trigger: Client Request: {name}\n\nevents: Ir\nsummary: 7\n\n"
-        f"fn=(1) f\n0 {instructions}\n\ntotals: {instructions}\n"
-    )
+def test_counts_are_between_marks_without_the_marks_own(tmp_path: Path) -> None:
+    from callgrind import counts
+
+    log = tmp_path / "log"
+    counter = (1000, 1010, 2000, 2110, 5000, 5410)
+    log.write_text("".join(f"threads: 1\nevents-1: {n}\nevents-1-0: 7\n" for n in counter))
+    assert counts(log, "mark 1\nshape/cold 10\ncycle 1\n") == [("shape/cold", 10), ("cycle", 400)]
+    with pytest.raises(RuntimeError, match="6 counts for 2 pairs"):
+        counts(log, "mark 1\nshape/cold 10\n")
 
 
-def test_the_worst_cycle_is_not_the_sum_of_the_worst_calls(tmp_path: Path) -> None:
+def test_the_worst_cycle_is_not_the_sum_of_the_worst_calls() -> None:
     from callgrind import worst_calls
 
-    file = tmp_path / "out"
-    file.write_text(
-        "version: 1\n"
-        + dump("before", 10**9)
-        + dump("cycle/full/right/imu", 100)
-        + dump("cycle/full/right/cables", 50)
-        + dump("cycle/full/right/imu", 120)
-        + dump("cycle/full/right/contacts", 5)
-        + "desc: Trigger: Program termination\ntotals: 1000000\n"
-    )
-    assert worst_calls(file) == {
+    calls = [("imu", 100), ("cables", 50), ("imu", 120), ("contacts", 5)]
+    assert worst_calls([(f"cycle/full/right/{kind}", count) for kind, count in calls]) == {
         "cycle/full/right": {"imu": 120, "cables": 50, "contacts": 5, "cycle": 150}
     }
 
