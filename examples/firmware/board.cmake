@@ -21,7 +21,7 @@ target_compile_options(firmware_options INTERFACE
   # sqrt is one instruction when nobody reads errno
   -fno-math-errno
   # temporaries of Eigen are on the stack, whatever their size: else it keeps a branch to malloc
-  -DEIGEN_STACK_ALLOCATION_LIMIT=0xFFFFFFFF
+  -DEIGEN_ALLOCA=__builtin_alloca -DEIGEN_STACK_ALLOCATION_LIMIT=0xFFFFFFFF
   $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions -fno-rtti -fno-threadsafe-statics
     -fno-use-cxa-atexit -Wdouble-promotion>)
 

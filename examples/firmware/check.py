@@ -152,7 +152,7 @@ def main() -> None:
     single, reference = (parse(program.result()) for program in on_host)
 
     sizes = table("image", "flash [KiB]", "static RAM [KiB]", "stack [KiB]", "RAM [KiB]")
-    costs = table("instructions per IMU cycle", "median", "worst", "start")
+    costs = table("instructions per IMU cycle", "mean", "median", "worst", "start")
     ends = table("final position [m]", "x, y, z", "off double precision [% of the path]")
     for method in METHODS:
         ends.add_row(f"host in double precision, {method}", position(reference[method]))
@@ -171,7 +171,8 @@ def main() -> None:
             limits.check(f"{core}, {image}: RAM", static + stack, RAM_LIMIT)
         for method in METHODS:
             replay = replays[method]
-            counts = (np.median(replay.cycles), replay.worst, replay.start)
+            cycles = replay.cycles
+            counts = (np.mean(cycles), np.median(cycles), replay.worst, replay.start)
             costs.add_row(f"{core}, {method}", *(f"{count:,.0f}" for count in counts))
             share = difference(replay, reference[method])
             ends.add_row(f"{core}, {method}", position(replay), f"{100 * share:.3f}")
