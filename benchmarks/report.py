@@ -104,7 +104,13 @@ class Page:
                     for kind, count in calls.items():
                         kinds[kind] = max(kinds.get(kind, 0.0), count)
             rows.append(
-                [method, *(thousands(kinds[k]) for k in ("imu", "cables", "contacts", "cycle"))]
+                [
+                    method,
+                    *(
+                        thousands(kinds[k]) if k in kinds else "–"
+                        for k in ("imu", "cables", "contacts", "cycle")
+                    ),
+                ]
             )
         return table(["worst call", "`imu`", "`cables`", "`contacts`", "whole cycle"], rows)
 
