@@ -42,7 +42,15 @@ TIMING = (
     "--benchmark_min_time=0.1",
     "--benchmark_enable_random_interleaving=true",
 )
-COUNTING = ("valgrind", "-q", "--tool=callgrind", "--callgrind-out-file=/dev/null")
+# Symbols are bound at the start, not by the first call that is counted.
+COUNTING = (
+    "env",
+    "LD_BIND_NOW=1",
+    "valgrind",
+    "-q",
+    "--tool=callgrind",
+    "--callgrind-out-file=/dev/null",
+)
 
 PROGRAMS = ("filter", "tight", "shape", "contact", "cycle", "dynamics", "unscented")
 WITH_RECORDINGS = ("shape", "contact", "cycle")
