@@ -1,8 +1,7 @@
 """The calibration of anchors and offsets on the real recordings of SUPERball.
 
-Three tables: how well ranges after the first 100 s are predicted by a calibration from the first
-100 s, how often random seeds end in the same constellation without any survey, and how long one
-calibration takes.
+Two tables: how well ranges after the first 100 s are predicted by a calibration from the first
+100 s, and how often random seeds end in the same constellation without any survey.
 
     python benchmarks/range_calibration.py ../shared/data/superball --seeds 20
 """
@@ -43,8 +42,6 @@ def main() -> None:
         reference = seeds(recording, "lm", arguments.seeds, None)
         if arguments.bfgs_seeds:
             seeds(recording, "bfgs", arguments.bfgs_seeds, reference)
-    for name in ("building45", "outdoor", "rolling_indoor"):
-        runtime(arguments.data / name)
 
 
 def predictions(folder: Path) -> None:
@@ -92,13 +89,6 @@ def seeds(
         f"constellation (tolerance {SAME_M} m){within}; {median(times):.2f} s each"
     )
     return reference
-
-
-def runtime(folder: Path) -> None:
-    """Wall clock of one calibration of the whole recording, with its survey."""
-    survey, recording = read_anchors(folder), read_ranges(folder)
-    times = [calibrate_ranges(recording, survey, seed=seed).runtime_s for seed in range(5)]
-    print(f"{folder.name}: {len(recording)} ranges, {median(times):.2f} s")
 
 
 def _errors(result: RangeCalibration, later: RangeRecording, other_anchors_only: bool) -> str:

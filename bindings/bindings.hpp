@@ -7,6 +7,43 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <array>
+
+#include "tensegrity/types.hpp"
+
+// A status is the result of every streaming call. py::native_enum makes it by a call into Python,
+// as long as the rest of the call together; the members are looked up once and kept instead.
+namespace pybind11::detail {
+
+template <>
+struct type_caster_enum_type_enabled<tensegrity::Status> : std::false_type {};
+
+template <>
+struct type_caster<tensegrity::Status> {
+  using Status = tensegrity::Status;
+  using General = type_caster_enum_type<Status>;
+
+  static constexpr auto name = General::name;
+  template <typename T>
+  using cast_op_type = detail::cast_op_type<T>;
+
+  bool load(handle source, bool convert) { return general_.load(source, convert); }
+  operator Status*() { return general_; }
+  operator Status&() { return general_; }
+
+  static handle cast(Status status, return_value_policy policy, handle parent) {
+    static std::array<PyObject*, std::size_t(Status::kWrongChirality) + 1> members{};
+    PyObject*& member = members[std::size_t(status)];
+    if (member == nullptr) member = General::cast(status, policy, parent).ptr();
+    return handle(member).inc_ref();
+  }
+
+ private:
+  General general_;
+};
+
+}  // namespace pybind11::detail
+
 namespace tensegrity::bindings {
 
 namespace py = pybind11;

@@ -1,5 +1,6 @@
 // The filter by itself: for tests against independent implementations and for other robots.
 #include "bindings.hpp"
+#include "numbers.hpp"
 #include "tensegrity/inekf/anchors.hpp"
 #include "tensegrity/inekf/contact_kinematics.hpp"
 #include "tensegrity/inekf/propagate.hpp"
@@ -11,6 +12,11 @@ namespace {
 using Belief = inekf::Belief<double, 1, 6>;
 using V3 = Vector3<double>;
 using RowVectors = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
+struct FilterNoise {
+  inekf::ProcessNoise<double> process;
+  double spin_walk;  // [rad/sqrt(s)]
+};
 
 RowVectors anchors(const Belief& b) { return b.anchors.leftCols(b.anchor_count).transpose(); }
 
@@ -25,20 +31,32 @@ void set_covariance(Belief& b, const Eigen::MatrixXd& p) {
   b.covariance.topLeftCorner(b.dim(), b.dim()) = p;
 }
 
-inekf::Kinematics<double, 6, 1> spun_kinematics(const Eigen::Matrix<double, 6, 3>& h,
-                                                const Matrix<double, 18>& covariance) {
+inekf::Kinematics<double, 6, 1> spun_kinematics(const Numbers<6, 3>& h,
+                                                const Numbers<18, 18>& covariance) {
   inekf::Kinematics<double, 6, 1> k;
-  k.h = h.transpose();
+  k.h = h.values.transpose();
   for (int i = 0; i < 6; ++i) {
     k.h_extra.middleRows<3>(3 * i) = V3::UnitZ().cross(V3(k.h.col(i)));
   }
-  k.covariance = covariance;
+  k.covariance = covariance.values;
   return k;
 }
 
 }  // namespace
 
 void bind_inekf(py::module_& m) {
+  py::class_<FilterNoise>(m, "FilterNoise",
+                          "Standard deviations: of one IMU sample (gyro_std [rad/s], accel_std "
+                          "[m/s^2]), and of random walks per square root of a second.")
+      .def(py::init([](double gyro_std, double accel_std, double gyro_bias_walk,
+                       double accel_bias_walk, double anchor_walk, double spin_walk) {
+             return FilterNoise{{gyro_std, accel_std, gyro_bias_walk, accel_bias_walk, anchor_walk},
+                                spin_walk};
+           }),
+           py::kw_only(), py::arg("gyro_std"), py::arg("accel_std"),
+           py::arg("gyro_bias_walk") = 0.0, py::arg("accel_bias_walk") = 0.0,
+           py::arg("anchor_walk") = 0.0, py::arg("spin_walk") = 0.0);
+
   py::class_<Belief>(m, "InvariantFilter",
                      "Mean on SE_{2+N}(3) x R^7 (biases and the spin angle) and covariance of the "
                      "right-invariant error (rotation, velocity, position, gyro bias, "
@@ -74,18 +92,14 @@ void bind_inekf(py::module_& m) {
           py::arg("error"), "Takes an error (16 + 3 N,) out of the mean: X <- Exp(-xi) X.")
       .def(
           "propagate",
-          [](Belief& b, const V3& gyro, const V3& accel, double dt, double gyro_std,
-             double accel_std, double gyro_bias_walk, double accel_bias_walk, double anchor_walk,
-             double spin_walk, double rolling_radius, double gravity) {
+          [](Belief& b, const Numbers<3>& gyro, const Numbers<3>& accel, double dt,
+             const FilterNoise& noise, double rolling_radius, double gravity) {
             if (!(dt > 0)) throw py::value_error("dt: has to be positive [s]");
-            inekf::propagate(b, {gyro, accel}, dt, gravity,
-                             {gyro_std, accel_std, gyro_bias_walk, accel_bias_walk, anchor_walk},
-                             {rolling_radius}, Vector<double, 1>(spin_walk));
+            inekf::propagate(b, {gyro.values, accel.values}, dt, gravity, noise.process,
+                             {rolling_radius}, Vector<double, 1>(noise.spin_walk));
           },
-          py::arg("gyro"), py::arg("accel"), py::arg("dt"), py::kw_only(), py::arg("gyro_std"),
-          py::arg("accel_std"), py::arg("gyro_bias_walk") = 0.0, py::arg("accel_bias_walk") = 0.0,
-          py::arg("anchor_walk") = 0.0, py::arg("spin_walk") = 0.0, py::arg("rolling_radius") = 0.0,
-          py::arg("gravity") = 9.81,
+          py::arg("gyro"), py::arg("accel"), py::arg("dt"), py::arg("noise"),
+          py::arg("rolling_radius") = 0.0, py::arg("gravity") = 9.81,
           "One IMU sample over dt [s]; gyro [rad/s] and accel [m/s^2] are means over the step.")
       .def(
           "augment",
@@ -106,8 +120,7 @@ void bind_inekf(py::module_& m) {
           py::arg("id"), "Drops the contact point of an endcap.")
       .def(
           "correct_contacts",
-          [](Belief& b, const Eigen::Matrix<double, 6, 3>& h, const Matrix<double, 18>& covariance,
-             double gate) {
+          [](Belief& b, const Numbers<6, 3>& h, const Numbers<18, 18>& covariance, double gate) {
             const inekf::Correction c =
                 inekf::correct_contacts(b, spun_kinematics(h, covariance), gate);
             return py::make_tuple(c.status, c.chi_square);

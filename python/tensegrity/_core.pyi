@@ -7,7 +7,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['CalibrationStatus', 'Chirality', 'ConstraintSet', 'ContactDetector', 'ContactDetectorParameters', 'ContactNoise', 'ContactPoint', 'DWM1000_TICK_S', 'FilterForm', 'ImuSampling', 'Integrator', 'InvariantFilter', 'IpoptShapeSolver', 'Madgwick', 'MadgwickSettings', 'Net', 'NetGround', 'NetSimulator', 'NetSimulatorFloat', 'PRISM_CABLES', 'Prism', 'PrismConfig', 'PrismEstimator', 'PrismHealth', 'PrismState', 'RangeCalibrationSolver', 'RangeLoss', 'RangingAnchors', 'RangingArrays', 'RangingConfig', 'RangingEstimator', 'RangingHealth', 'RangingProcessNoise', 'RangingRobot', 'RangingState', 'SPEED_OF_LIGHT', 'ShapeMethod', 'ShapeSolver', 'ShapeTracker', 'SigmaWeights', 'SpinMethod', 'Status', 'Terrain', 'UnscentedFilter', 'UnscentedSettings', 'cable_lengths', 'endcap_jacobian', 'fold', 'in_body_frame', 'inequality_values', 'length_jacobian', 'mutual_moments', 'spin_angle', 'two_way_ranges']
+__all__: list[str] = ['CalibrationStatus', 'Chirality', 'ConstraintSet', 'ContactDetector', 'ContactDetectorParameters', 'ContactNoise', 'ContactPoint', 'DWM1000_TICK_S', 'FilterForm', 'FilterNoise', 'ImuSampling', 'Integrator', 'InvariantFilter', 'IpoptShapeSolver', 'Madgwick', 'MadgwickSettings', 'Net', 'NetGround', 'NetSimulator', 'NetSimulatorFloat', 'PRISM_CABLES', 'Prism', 'PrismConfig', 'PrismEstimator', 'PrismHealth', 'PrismState', 'RangeCalibrationSolver', 'RangeLoss', 'RangingAnchors', 'RangingArrays', 'RangingConfig', 'RangingEstimator', 'RangingHealth', 'RangingProcessNoise', 'RangingRobot', 'RangingState', 'SPEED_OF_LIGHT', 'ShapeMethod', 'ShapeSolver', 'ShapeTracker', 'SigmaWeights', 'SpinMethod', 'Status', 'Terrain', 'UnscentedFilter', 'UnscentedSettings', 'cable_lengths', 'endcap_jacobian', 'fold', 'in_body_frame', 'inequality_values', 'length_jacobian', 'mutual_moments', 'spin_angle', 'two_way_ranges']
 class Status(enum.Enum):
     """
     What a call did with its input.
@@ -159,6 +159,12 @@ class IpoptShapeSolver:
         """
         Of the last call, all starts.
         """
+class FilterNoise:
+    """
+    Standard deviations: of one IMU sample (gyro_std [rad/s], accel_std [m/s^2]), and of random walks per square root of a second.
+    """
+    def __init__(self, *, gyro_std: typing.SupportsFloat | typing.SupportsIndex, accel_std: typing.SupportsFloat | typing.SupportsIndex, gyro_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, accel_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, anchor_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, spin_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        ...
 class InvariantFilter:
     """
     Mean on SE_{2+N}(3) x R^7 (biases and the spin angle) and covariance of the right-invariant error (rotation, velocity, position, gyro bias, accelerometer bias, spin, contacts).
@@ -177,7 +183,7 @@ class InvariantFilter:
         """
         Drops the contact point of an endcap.
         """
-    def propagate(self, gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], dt: typing.SupportsFloat | typing.SupportsIndex, *, gyro_std: typing.SupportsFloat | typing.SupportsIndex, accel_std: typing.SupportsFloat | typing.SupportsIndex, gyro_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, accel_bias_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, anchor_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, spin_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, rolling_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, gravity: typing.SupportsFloat | typing.SupportsIndex = 9.81) -> None:
+    def propagate(self, gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], dt: typing.SupportsFloat | typing.SupportsIndex, noise: FilterNoise, rolling_radius: typing.SupportsFloat | typing.SupportsIndex = 0.0, gravity: typing.SupportsFloat | typing.SupportsIndex = 9.81) -> None:
         """
         One IMU sample over dt [s]; gyro [rad/s] and accel [m/s^2] are means over the step.
         """

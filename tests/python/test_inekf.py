@@ -221,7 +221,7 @@ def test_equals_a_dense_filter_over_1000_random_steps(seed):
             + 0.2 * dense.rotation.T @ -dense.x[:3, 3]  # keeps the random walk in bounds
             + rng.normal(size=3) * (50 if violent else 2)
         )
-        fast.propagate(gyro, accel, 0.005, **NOISE)
+        fast.propagate(gyro, accel, 0.005, _core.FilterNoise(**NOISE))
         dense.propagate(gyro, accel, 0.005)
         h = rng.normal(size=(6, 3)) * 0.5
         for slot, endcap in enumerate(dense.ids):  # kinematics near what the filter expects
@@ -292,7 +292,7 @@ def violent_filter(seed):
 def test_transition_against_finite_differences(seed, radius):
     f, ids, rng = violent_filter(seed)
     gyro, accel = rng.normal(size=3) * 8, rng.normal(size=3) * 40
-    silent = dict.fromkeys(NOISE, 0.0)
+    silent = _core.FilterNoise(**dict.fromkeys(NOISE, 0.0))
     dim = len(f.covariance)
     for _ in range(4):
         u = rng.normal(size=dim)
@@ -300,12 +300,12 @@ def test_transition_against_finite_differences(seed, radius):
         for sign in (1, -1):
             g = clone(f, ids)
             g.retract(-sign * 1e-5 * u)
-            g.propagate(gyro, accel, 0.005, **silent, rolling_radius=radius)
+            g.propagate(gyro, accel, 0.005, silent, rolling_radius=radius)
             ends.append(g)
         numeric = relative_error(ends[0], ends[1]) / 2e-5
         g = clone(f, ids)
         g.covariance = np.outer(u, u)
-        g.propagate(gyro, accel, 0.005, **silent, rolling_radius=radius)
+        g.propagate(gyro, accel, 0.005, silent, rolling_radius=radius)
         # Rolling neglects the change of the contact's lever arm within the step: O(r |w|^2 dt^2).
         tolerance = 1e-6 if radius == 0 else radius * (8 * 0.005) ** 2 * np.abs(u).max()
         np.testing.assert_allclose(
@@ -389,7 +389,7 @@ def test_invariance_under_shift_and_turn_about_gravity(radius):
     for step in range(400):
         gyro, accel = rng.normal(size=3), a.rotation.T @ -GRAVITY + rng.normal(size=3)
         for f in (a, b):
-            f.propagate(gyro, accel, 0.005, **NOISE, rolling_radius=radius)
+            f.propagate(gyro, accel, 0.005, _core.FilterNoise(**NOISE), rolling_radius=radius)
         h = rng.normal(size=(6, 3)) * 0.5
         for slot, endcap in enumerate(a.anchor_ids):
             h[endcap] = a.rotation.T @ (a.anchors[slot] - a.position) + rng.normal(size=3) * 0.01
@@ -420,16 +420,16 @@ def test_propagated_covariance_against_monte_carlo():
     steps, dt, runs = 40, 0.005, 3000
     gyro = rng.normal(size=(steps, 3)) * 2
     accel = rng.normal(size=(steps, 3)) * 5 + [0, 0, 9.81]
-    noise = {"gyro_std": 0.1, "accel_std": 1.0}
+    noise = _core.FilterNoise(gyro_std=0.1, accel_std=1.0)
     reference = make_filter(start)
     for k in range(steps):
-        reference.propagate(gyro[k], accel[k], dt, **noise)
+        reference.propagate(gyro[k], accel[k], dt, noise)
     errors = []
     for _ in range(runs):
         f = make_filter(start)
         for k in range(steps):
             f.propagate(
-                gyro[k] + rng.normal(size=3) * 0.1, accel[k] + rng.normal(size=3), dt, **noise
+                gyro[k] + rng.normal(size=3) * 0.1, accel[k] + rng.normal(size=3), dt, noise
             )
         errors.append(relative_error(f, reference)[:9])
     sampled = np.cov(np.array(errors).T)
@@ -442,7 +442,7 @@ def test_propagated_covariance_against_monte_carlo():
 def test_wrong_use_is_reported():
     f = _core.InvariantFilter()
     with pytest.raises(ValueError, match="dt"):
-        f.propagate(np.zeros(3), np.zeros(3), 0.0, gyro_std=0.1, accel_std=0.1)
+        f.propagate(np.zeros(3), np.zeros(3), 0.0, _core.FilterNoise(gyro_std=0.1, accel_std=0.1))
     with pytest.raises(ValueError, match="no contact point"):
         f.marginalise(3)
     with pytest.raises(ValueError, match="16 x 16"):

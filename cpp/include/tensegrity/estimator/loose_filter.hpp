@@ -148,7 +148,7 @@ class LooseFilter {
     s.velocity_covariance = belief_.velocity_covariance();
     s.position_covariance = belief_.position_covariance();
     for (int slot = 0; slot < belief_.anchor_count; ++slot) {
-      s.contacts[std::size_t(belief_.anchor_ids[slot])] = true;
+      s.contacts[std::size_t(belief_.anchor_ids[std::size_t(slot)])] = true;
     }
   }
 

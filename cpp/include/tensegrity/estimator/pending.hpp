@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "tensegrity/robot/prism.hpp"
@@ -24,7 +25,7 @@ struct PendingMeasurement {
 };
 
 // Sorted by stamp, bounded. When it is full (the IMU has been silent) the oldest entry goes.
-template <typename Scalar, int Capacity = 16>
+template <typename Scalar, std::size_t Capacity = 16>
 class PendingQueue {
  public:
   using Item = PendingMeasurement<Scalar>;
@@ -33,7 +34,7 @@ class PendingQueue {
   bool push(const Item& item) {
     const bool full = size_ == Capacity;
     if (full) pop();
-    int i = size_++;
+    std::size_t i = size_++;
     for (; i > 0 && item.before(items_[i - 1]); --i) items_[i] = items_[i - 1];
     items_[i] = item;
     return !full;
@@ -41,13 +42,13 @@ class PendingQueue {
   bool empty() const { return size_ == 0; }
   const Item& front() const { return items_[0]; }
   void pop() {
-    for (int i = 1; i < size_; ++i) items_[i - 1] = items_[i];
+    for (std::size_t i = 1; i < size_; ++i) items_[i - 1] = items_[i];
     --size_;
   }
 
  private:
   std::array<Item, Capacity> items_{};
-  int size_ = 0;
+  std::size_t size_ = 0;
 };
 
 }  // namespace tensegrity

@@ -39,9 +39,9 @@ SpinStart<Scalar> find_spin(const Endcaps<Scalar>& q, const Vector3<Scalar>& up,
     for (int k = 0; k < 3; ++k) {
       int best = -1;
       for (int i = 0; i < 6; ++i) {
-        if (!low[i] && (best < 0 || heights[i] < heights[best])) best = i;
+        if (!low[std::size_t(i)] && (best < 0 || heights[i] < heights[best])) best = i;
       }
-      low[best] = true;
+      low[std::size_t(best)] = true;
     }
     return low;
   };
@@ -62,7 +62,7 @@ SpinStart<Scalar> find_spin(const Endcaps<Scalar>& q, const Vector3<Scalar>& up,
     const std::array<bool, 6> on = given > 0 ? contacts : lowest_three(heights);
     Scalar n = 0, mean = 0, mean_rate = 0;
     for (int i = 0; i < 6; ++i) {
-      if (!on[i]) continue;
+      if (!on[std::size_t(i)]) continue;
       n += 1;
       mean += heights[i];
       mean_rate += rates[i];
@@ -71,7 +71,7 @@ SpinStart<Scalar> find_spin(const Endcaps<Scalar>& q, const Vector3<Scalar>& up,
     mean_rate /= n;
     Level result{0, 0, 0};
     for (int i = 0; i < 6; ++i) {
-      if (!on[i]) continue;
+      if (!on[std::size_t(i)]) continue;
       result.spread += (heights[i] - mean) * (heights[i] - mean);
       result.slope += (heights[i] - mean) * (rates[i] - mean_rate);
       result.curvature += (rates[i] - mean_rate) * (rates[i] - mean_rate);

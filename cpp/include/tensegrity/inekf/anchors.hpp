@@ -30,7 +30,7 @@ bool augment(B& belief, int id, const Vector3<Scalar>& h,
                               r * h_covariance * r.transpose();
   p.template block<3, 3>(at, at) = (own + own.transpose()) / 2;
   belief.anchors.col(belief.anchor_count) = belief.position + r * h;
-  belief.anchor_ids[belief.anchor_count] = id;
+  belief.anchor_ids[std::size_t(belief.anchor_count)] = id;
   ++belief.anchor_count;
   return true;
 }
@@ -47,7 +47,7 @@ void marginalise(B& belief, int slot) {
   p.template middleCols<3>(n - 3).setZero();
   for (int i = slot; i + 1 < belief.anchor_count; ++i) {
     belief.anchors.col(i) = belief.anchors.col(i + 1);
-    belief.anchor_ids[i] = belief.anchor_ids[i + 1];
+    belief.anchor_ids[std::size_t(i)] = belief.anchor_ids[std::size_t(i + 1)];
   }
   --belief.anchor_count;
 }

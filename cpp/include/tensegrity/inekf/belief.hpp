@@ -55,7 +55,7 @@ struct Belief {
   // Slot of an endcap's anchor, or -1.
   int find(int id) const {
     for (int slot = 0; slot < anchor_count; ++slot) {
-      if (anchor_ids[slot] == id) return slot;
+      if (anchor_ids[std::size_t(slot)] == id) return slot;
     }
     return -1;
   }

@@ -92,7 +92,7 @@ class SEk3 {
     if (a2 < (sizeof(Scalar) == sizeof(float) ? Scalar(0.25) : Scalar(0.01))) {
       c1 = (1 - a2 / 20 * (1 - a2 / 42 * (1 - a2 / 72))) / 6;
       c2 = (1 - a2 / 30 * (1 - a2 / 56 * (1 - a2 / 90))) / 24;
-      c3 = (1 - a2 / 21 * (1 - a2 / 48 * (1 - a2 / 247.5))) / 120;
+      c3 = (1 - a2 / 21 * (1 - a2 / 48 * (1 - a2 / Scalar(247.5)))) / 120;
     } else {
       const Scalar a = std::sqrt(a2);
       const Scalar s = std::sin(a), c = std::cos(a);

@@ -53,10 +53,10 @@ class CalibrationSolver {
     for (std::size_t i = 0; i < problem.strips.size(); ++i) {
       const int index = static_cast<int>(i);
       if (problem.strips[i].modules == 2) {
-        order_.push_back({true, static_cast<int>(rods_.size())});
+        order_.push_back({true, rods_.size()});
         rods_.emplace_back(problem, index);
       } else {
-        order_.push_back({false, static_cast<int>(singles_.size())});
+        order_.push_back({false, singles_.size()});
         singles_.emplace_back(problem, index);
       }
     }
@@ -141,7 +141,7 @@ class CalibrationSolver {
  private:
   struct Place {
     bool rod;
-    int index;
+    std::size_t index;
   };
 
   static constexpr int kAttempts = 25;

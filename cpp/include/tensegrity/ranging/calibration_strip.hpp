@@ -26,18 +26,18 @@ class CalibrationStripSolver {
 
   // `index` is the strip's among those of the problem.
   CalibrationStripSolver(const CalibrationProblem<Scalar>& problem, int index)
-      : knots_(problem.strips[index].knots),
+      : knots_(problem.strips[std::size_t(index)].knots),
         range_std_(problem.range_std),
         rod_information_(1 / (problem.rod_std * problem.rod_std)),
         knot_information_(problem.knot_information),
-        motion_information_(problem.strips[index].motion_information) {
-    std::vector<int> local(problem.shared(), -1);
+        motion_information_(problem.strips[std::size_t(index)].motion_information) {
+    std::vector<int> local(static_cast<std::size_t>(problem.shared()), -1);
     const auto column = [&](int shared) {
-      if (local[shared] < 0) {
-        local[shared] = static_cast<int>(border_.size());
+      if (local[std::size_t(shared)] < 0) {
+        local[std::size_t(shared)] = static_cast<int>(border_.size());
         border_.push_back(shared);
       }
-      return local[shared];
+      return local[std::size_t(shared)];
     };
     for (std::size_t i = 0; i < problem.ranges.size(); ++i) {
       const CalibrationRange<Scalar>& range = problem.ranges[i];
@@ -61,28 +61,30 @@ class CalibrationStripSolver {
     }
     std::stable_sort(rows_.begin(), rows_.end(),
                      [](const Row& a, const Row& b) { return a.knot < b.knot; });
-    const int rod = problem.strips[index].rod_length;
+    const int rod = problem.strips[std::size_t(index)].rod_length;
     if (Modules == 2 && rod >= 0) {
       rod_ = 3 * problem.anchors + problem.offset_terms + rod;
       rod_column_ = column(rod_);
     }
     width_ = static_cast<int>(border_.size());
-    positions_.assign(kSize * knots_, Scalar(0));
+    const std::size_t knots = static_cast<std::size_t>(knots_);
+    const std::size_t width = static_cast<std::size_t>(width_);
+    positions_.assign(kSize * knots, Scalar(0));
     trial_ = positions_;
     gradient_ = positions_;
     step_ = positions_;
     const std::size_t block = kSize * kSize;
-    diagonal_.resize(block * knots_);
-    coupling_.resize(block * knots_);
-    factor_.resize(block * knots_);
-    link_.resize(block * knots_);
-    cross_.resize(static_cast<std::size_t>(kSize) * width_ * knots_);
+    diagonal_.resize(block * knots);
+    coupling_.resize(block * knots);
+    factor_.resize(block * knots);
+    link_.resize(block * knots);
+    cross_.resize(kSize * width * knots);
     // One more column than the border: the eliminated gradient.
-    eliminated_.resize(static_cast<std::size_t>(kSize) * (width_ + 1) * knots_);
-    shared_information_.resize(static_cast<std::size_t>(width_) * width_);
-    shared_gradient_.resize(width_);
-    reduced_.resize(static_cast<std::size_t>(width_ + 1) * (width_ + 1));
-    border_step_.resize(width_ + 1);
+    eliminated_.resize(kSize * (width + 1) * knots);
+    shared_information_.resize(width * width);
+    shared_gradient_.resize(width);
+    reduced_.resize((width + 1) * (width + 1));
+    border_step_.resize(width + 1);
   }
 
   std::vector<Scalar>& positions() { return positions_; }
@@ -100,8 +102,8 @@ class CalibrationStripSolver {
     }
     for (int k = 0; k + 1 < knots_; ++k) {
       for (int i = kSize * k; i < kSize * (k + 1); ++i) {
-        const Scalar moved = at[i + kSize] - at[i];
-        sum += motion_information_[k] * moved * moved;
+        const Scalar moved = at[std::size_t(i + kSize)] - at[std::size_t(i)];
+        sum += motion_information_[std::size_t(k)] * moved * moved;
       }
     }
     for (std::size_t i = 0; i < at.size(); ++i) sum += knot_information_[i % 3] * at[i] * at[i];
@@ -123,8 +125,9 @@ class CalibrationStripSolver {
     for (int k = 0; k + 1 < knots_; ++k) add_motion(k);
     for (int k = 0; k < knots_; ++k) {
       for (int i = 0; i < kSize; ++i) {
-        diagonal(k, i, i) += knot_information_[i % 3];
-        gradient_[kSize * k + i] += knot_information_[i % 3] * positions_[kSize * k + i];
+        diagonal(k, i, i) += knot_information_[std::size_t(i % 3)];
+        gradient_[std::size_t(kSize * k + i)] +=
+            knot_information_[std::size_t(i % 3)] * positions_[std::size_t(kSize * k + i)];
       }
     }
     if constexpr (Modules == 2) {
@@ -137,9 +140,10 @@ class CalibrationStripSolver {
   // Adds what the strip's ranges say about the shared parameters directly.
   void add_shared(SharedMatrix& information, Shared& gradient) const {
     for (int i = 0; i < width_; ++i) {
-      gradient[border_[i]] += shared_gradient_[i];
+      gradient[border_[std::size_t(i)]] += shared_gradient_[std::size_t(i)];
       for (int j = 0; j < width_; ++j) {
-        information(border_[i], border_[j]) += shared_information_[i * width_ + j];
+        information(border_[std::size_t(i)], border_[std::size_t(j)]) +=
+            shared_information_[std::size_t(i * width_ + j)];
       }
     }
   }
@@ -153,18 +157,18 @@ class CalibrationStripSolver {
     const int columns = width_ + 1;
     const Scalar range_information = 1 / (range_std_ * range_std_);
     for (int k = 0; k < knots_; ++k) {
-      Scalar* factor = &factor_[kSize * kSize * k];
-      std::copy_n(&diagonal_[kSize * kSize * k], kSize * kSize, factor);
+      Scalar* factor = &factor_[std::size_t(kSize * kSize * k)];
+      std::copy_n(&diagonal_[std::size_t(kSize * kSize * k)], kSize * kSize, factor);
       for (int i = 0; i < kSize; ++i) {
         factor[i * kSize + i] += damping * (factor[i * kSize + i] + range_information);
       }
-      Scalar* rows = &eliminated_[static_cast<std::size_t>(kSize) * columns * k];
+      Scalar* rows = &eliminated_[std::size_t(kSize) * std::size_t(columns) * std::size_t(k)];
       for (int i = 0; i < kSize; ++i) {
         std::copy_n(&cross(k, i, 0), width_, rows + columns * i);
-        rows[columns * i + width_] = gradient_[kSize * k + i];
+        rows[columns * i + width_] = gradient_[std::size_t(kSize * k + i)];
       }
       if (k > 0) {
-        const Scalar* link = &link_[kSize * kSize * (k - 1)];
+        const Scalar* link = &link_[std::size_t(kSize * kSize * (k - 1))];
         const Scalar* before = rows - kSize * columns;
         for (int i = 0; i < kSize; ++i) {
           Scalar weights[kSize];
@@ -174,21 +178,24 @@ class CalibrationStripSolver {
         }
       }
       if (!cholesky(factor)) return false;
-      Scalar* link = &link_[kSize * kSize * k];
-      std::copy_n(&coupling_[kSize * kSize * k], kSize * kSize, link);
+      Scalar* link = &link_[std::size_t(kSize * kSize * k)];
+      std::copy_n(&coupling_[std::size_t(kSize * kSize * k)], kSize * kSize, link);
       forward(factor, link, kSize);
       forward(factor, rows, columns);
       for (int j = 0; j < columns; ++j) {
         Scalar weights[kSize];
         for (int m = 0; m < kSize; ++m) weights[m] = rows[columns * m + j];
-        subtract_rows(weights, rows, columns, j + 1, &reduced_[columns * j]);
+        subtract_rows(weights, rows, columns, j + 1, &reduced_[std::size_t(columns * j)]);
       }
     }
     for (int j = 0; j < width_; ++j) {
-      gradient[border_[j]] += reduced_[columns * width_ + j];
+      gradient[border_[std::size_t(j)]] += reduced_[std::size_t(columns * width_ + j)];
       for (int i = 0; i <= j; ++i) {
-        information(border_[i], border_[j]) += reduced_[columns * j + i];
-        if (i != j) information(border_[j], border_[i]) += reduced_[columns * j + i];
+        information(border_[std::size_t(i)], border_[std::size_t(j)]) +=
+            reduced_[std::size_t(columns * j + i)];
+        if (i != j)
+          information(border_[std::size_t(j)], border_[std::size_t(i)]) +=
+              reduced_[std::size_t(columns * j + i)];
       }
     }
     return true;
@@ -197,16 +204,18 @@ class CalibrationStripSolver {
   // The step of the knots that goes with the step of the shared parameters; makes the trial.
   void substitute(const Shared& shared_step) {
     const int columns = width_ + 1;
-    for (int j = 0; j < width_; ++j) border_step_[j] = shared_step[border_[j]];
-    border_step_[width_] = 1;  // times the eliminated gradient
+    for (int j = 0; j < width_; ++j)
+      border_step_[std::size_t(j)] = shared_step[border_[std::size_t(j)]];
+    border_step_[std::size_t(width_)] = 1;  // times the eliminated gradient
     for (int k = knots_ - 1; k >= 0; --k) {
-      const Scalar* rows = &eliminated_[static_cast<std::size_t>(kSize) * columns * k];
-      const Scalar* link = &link_[kSize * kSize * k];
-      const Scalar* factor = &factor_[kSize * kSize * k];
-      Scalar* x = &step_[kSize * k];
+      const Scalar* rows = &eliminated_[std::size_t(kSize) * std::size_t(columns) * std::size_t(k)];
+      const Scalar* link = &link_[std::size_t(kSize * kSize * k)];
+      const Scalar* factor = &factor_[std::size_t(kSize * kSize * k)];
+      Scalar* x = &step_[std::size_t(kSize * k)];
       for (int i = 0; i < kSize; ++i) {
         x[i] = 0;
-        for (int j = 0; j < columns; ++j) x[i] -= rows[columns * i + j] * border_step_[j];
+        for (int j = 0; j < columns; ++j)
+          x[i] -= rows[columns * i + j] * border_step_[std::size_t(j)];
         if (k + 1 < knots_) {
           for (int j = 0; j < kSize; ++j) x[i] -= link[kSize * i + j] * x[kSize + j];
         }
@@ -223,7 +232,8 @@ class CalibrationStripSolver {
 
   // Whitened residuals of the strip's ranges, at their place among those of the problem.
   void residuals(const Shared& shared, std::vector<Scalar>& out) const {
-    for (const Row& row : rows_) out[row.source] = evaluate(row, positions_, shared).residual;
+    for (const Row& row : rows_)
+      out[std::size_t(row.source)] = evaluate(row, positions_, shared).residual;
   }
 
  private:
@@ -258,8 +268,8 @@ class CalibrationStripSolver {
     Scalar squared = 0;
     const bool between = row.blend > 0;
     for (int i = 0; i < 3; ++i) {
-      Scalar x = at[row.at + i];
-      if (between) x += row.blend * (at[row.at + kSize + i] - x);
+      Scalar x = at[std::size_t(row.at + i)];
+      if (between) x += row.blend * (at[std::size_t(row.at + kSize + i)] - x);
       result.direction[i] = x - shared[row.anchor + i];
       squared += result.direction[i] * result.direction[i];
     }
@@ -290,10 +300,14 @@ class CalibrationStripSolver {
     }
   }
 
-  Scalar& diagonal(int k, int i, int j) { return diagonal_[kSize * (kSize * k + i) + j]; }
-  Scalar& coupling(int k, int i, int j) { return coupling_[kSize * (kSize * k + i) + j]; }
+  Scalar& diagonal(int k, int i, int j) {
+    return diagonal_[std::size_t(kSize * (kSize * k + i) + j)];
+  }
+  Scalar& coupling(int k, int i, int j) {
+    return coupling_[std::size_t(kSize * (kSize * k + i) + j)];
+  }
   Scalar& cross(int k, int i, int column) {
-    return cross_[static_cast<std::size_t>(width_) * (kSize * k + i) + column];
+    return cross_[std::size_t(width_) * std::size_t(kSize * k + i) + std::size_t(column)];
   }
 
   void add_range(const Row& row, const Shared& shared, const RobustLoss<Scalar>& loss) {
@@ -310,7 +324,7 @@ class CalibrationStripSolver {
       const int k = row.knot + end;
       for (int i = 0; i < 3; ++i) {
         const Scalar slope = weight * share[end] * e.direction[i];
-        gradient_[kSize * k + first + i] += slope * e.residual;
+        gradient_[std::size_t(kSize * k + first + i)] += slope * e.residual;
         for (int j = 0; j < 3; ++j) {
           diagonal(k, first + i, first + j) += slope * share[end] * e.direction[j];
           if (end == 0 && ends == 2) {
@@ -321,21 +335,21 @@ class CalibrationStripSolver {
       }
     }
     for (int a = 0; a < columns; ++a) {
-      shared_gradient_[row.columns[a]] += weight * slopes[a] * e.residual;
+      shared_gradient_[std::size_t(row.columns[a])] += weight * slopes[a] * e.residual;
       for (int b = 0; b < columns; ++b) {
-        shared_information_[row.columns[a] * width_ + row.columns[b]] +=
+        shared_information_[std::size_t(row.columns[a] * width_ + row.columns[b])] +=
             weight * slopes[a] * slopes[b];
       }
     }
   }
 
   void add_motion(int k) {
-    const Scalar information = motion_information_[k];
+    const Scalar information = motion_information_[std::size_t(k)];
     for (int i = 0; i < kSize; ++i) {
-      const Scalar force =
-          information * (positions_[kSize * (k + 1) + i] - positions_[kSize * k + i]);
-      gradient_[kSize * k + i] -= force;
-      gradient_[kSize * (k + 1) + i] += force;
+      const Scalar force = information * (positions_[std::size_t(kSize * (k + 1) + i)] -
+                                          positions_[std::size_t(kSize * k + i)]);
+      gradient_[std::size_t(kSize * k + i)] -= force;
+      gradient_[std::size_t(kSize * (k + 1) + i)] += force;
       diagonal(k, i, i) += information;
       diagonal(k + 1, i, i) += information;
       coupling(k, i, i) -= information;
@@ -343,19 +357,19 @@ class CalibrationStripSolver {
   }
 
   void add_rod(int k, const Shared& shared, const RobustLoss<Scalar>& loss) {
-    const Rod r = rod(&positions_[kSize * k]);
+    const Rod r = rod(&positions_[std::size_t(kSize * k)]);
     const Scalar error = r.length - shared[rod_];
     const Scalar information = rod_information_ * loss.weight(rod_information_ * error * error);
     for (int i = 0; i < kSize; ++i) {
       const Scalar slope = (i < 3 ? -1 : 1) * information * r.direction[i % 3];
-      gradient_[kSize * k + i] += slope * error;
+      gradient_[std::size_t(kSize * k + i)] += slope * error;
       for (int j = 0; j < kSize; ++j) {
         diagonal(k, i, j) += slope * (j < 3 ? -1 : 1) * r.direction[j % 3];
       }
       cross(k, i, rod_column_) -= slope;
     }
-    shared_gradient_[rod_column_] -= information * error;
-    shared_information_[rod_column_ * width_ + rod_column_] += information;
+    shared_gradient_[std::size_t(rod_column_)] -= information * error;
+    shared_information_[std::size_t(rod_column_ * width_ + rod_column_)] += information;
   }
 
   // out -= sum of weights[m] * row m, the first `count` numbers of rows that are `columns` long

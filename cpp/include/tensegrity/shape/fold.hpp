@@ -45,8 +45,8 @@ TangentMatrix<Scalar> cofactors(const TangentMatrix<Scalar>& matrix) {
   // adj(A) = det(P) det(Q) Q adj(U) L^-1 P, and the cofactors are its transpose.
   factors.template triangularView<Eigen::UnitLower>().template solveInPlace<Eigen::OnTheRight>(
       adjugate);
-  const Scalar scale =
-      lu.permutationP().determinant() * lu.permutationQ().determinant() * u1.diagonal().prod();
+  const Scalar scale = Scalar(lu.permutationP().determinant() * lu.permutationQ().determinant()) *
+                       u1.diagonal().prod();
   adjugate = (lu.permutationQ() * adjugate * lu.permutationP()).eval();
   return scale * adjugate.transpose();
 }

@@ -56,16 +56,16 @@ class Rods {
     for (int k = 0; k < 2; ++k) {
       const Vector3<Scalar> even = endcaps.col(2 * k + 2);
       const Vector3<Scalar> odd = endcaps.col(2 * k + 3);
-      rods_[k].centre = (even + odd) / 2;
+      rods_[std::size_t(k)].centre = (even + odd) / 2;
       const Vector3<Scalar> u = (even - odd).normalized();
       // The axis least aligned with u gives a well-conditioned plane across the rod.
       int axis = 0;
       u.cwiseAbs().minCoeff(&axis);
-      set_direction(rods_[k], u, Vector3<Scalar>::Unit(axis));
+      set_direction(rods_[std::size_t(k)], u, Vector3<Scalar>::Unit(axis));
     }
   }
 
-  const Rod& rod(int k) const { return rods_[k]; }
+  const Rod& rod(int k) const { return rods_[std::size_t(k)]; }
   Scalar half_length() const { return half_length_; }
 
   // Endcap centres in the body frame, one per column [m].
@@ -74,8 +74,10 @@ class Rods {
     q.col(0) = base_[0];
     q.col(1) = base_[1];
     for (int k = 0; k < 2; ++k) {
-      q.col(2 * k + 2) = rods_[k].centre + half_length_ * rods_[k].direction();
-      q.col(2 * k + 3) = rods_[k].centre - half_length_ * rods_[k].direction();
+      q.col(2 * k + 2) =
+          rods_[std::size_t(k)].centre + half_length_ * rods_[std::size_t(k)].direction();
+      q.col(2 * k + 3) =
+          rods_[std::size_t(k)].centre - half_length_ * rods_[std::size_t(k)].direction();
     }
     return q;
   }
@@ -85,7 +87,7 @@ class Rods {
   // are exact to second order as well.
   void retract(const Tangent<Scalar>& delta) {
     for (int k = 0; k < 2; ++k) {
-      Rod& rod = rods_[k];
+      Rod& rod = rods_[std::size_t(k)];
       rod.centre += delta.template segment<3>(5 * k);
       const Vector3<Scalar> u =
           rod.direction() + rod.across() * delta.template segment<2>(5 * k + 3) / half_length_;
@@ -118,7 +120,7 @@ class Rods {
       const int k = free_rod(endcap);
       jacobian.template block<3, 3>(3 * endcap, 5 * k).setIdentity();
       jacobian.template block<3, 2>(3 * endcap, 5 * k + 3) =
-          Scalar(rod_side(endcap)) * rods_[k].across();
+          Scalar(rod_side(endcap)) * rods_[std::size_t(k)].across();
     }
     return jacobian;
   }

@@ -1,24 +1,21 @@
-// Time of one prediction of an unscented filter: every sigma point through 20 Runge-Kutta steps of
-// 5 ms, for SUPERball and for prisms of 3 to 48 rods, in double and single precision.
+// One prediction of an unscented filter: every sigma point through 20 Runge-Kutta steps of 5 ms,
+// for SUPERball and for prisms of 3 to 48 rods, in double and single precision.
 //
-//   cmake -S . -B build/bench -DTENSEGRITY_BUILD_BENCHMARKS=ON -DTENSEGRITY_NATIVE=ON
-//   cmake --build build/bench && build/bench/benchmarks/dynamics
-//
-// Prints the least and the median time of many repetitions: others on the machine only add time.
-#include <algorithm>
-#include <chrono>
+// Each call starts from the same sigma points; the copy is a thousandth of it.
+#include "tensegrity/dynamics/simulator.hpp"
+
 #include <cmath>
 #include <cstdio>
-#include <random>
+#include <cstdlib>
 #include <vector>
 
-#include "tensegrity/dynamics/simulator.hpp"
+#include "runner.hpp"
 
 namespace {
 
+using tensegrity::benchmarks::Program;
 using tensegrity::dynamics::Net;
 using tensegrity::dynamics::Simulator;
-using Clock = std::chrono::steady_clock;
 using Positions = Eigen::Matrix<double, 3, Eigen::Dynamic>;
 
 constexpr double kRodLength = 1.7;     // [m]
@@ -98,51 +95,47 @@ Robot<Scalar> prism(int rods) {
 }
 
 template <typename Scalar>
-void report(const char* name, const Robot<Scalar>& robot) {
-  constexpr int kSteps = 20;
-  const Eigen::Index n3 = robot.positions.size();
-  Simulator<Scalar> simulator(robot.net);
-  // Sigma points: the mean, and pairs with one coordinate displaced.
-  typename Simulator<Scalar>::States start(4 * n3 + 1, 2 * n3), states;
-  start.leftCols(n3).rowwise() =
-      Eigen::Map<const Eigen::RowVectorXd>(robot.positions.data(), n3).cast<Scalar>();
-  start.rightCols(n3).setZero();
-  for (Eigen::Index c = 0; c < 2 * n3; ++c) {
-    start(1 + c, c) += Scalar(0.02);
-    start(1 + 2 * n3 + c, c) -= Scalar(0.02);
-  }
-  typename Simulator<Scalar>::Vector rest(Eigen::Index(robot.net.cables.size()));
-  for (Eigen::Index k = 0; k < rest.size(); ++k)
-    rest[k] = robot.net.cables[std::size_t(k)].rest_length;
-  std::vector<double> times;
-  const int repetitions = std::max(20, int(20000 / start.rows()));
-  for (int k = 0; k < repetitions; ++k) {
-    states = start;
-    const auto begin = Clock::now();
-    const auto status = simulator.step(states, rest, Scalar(0.005), kSteps);
-    const std::chrono::duration<double, std::milli> time = Clock::now() - begin;
-    if (status != tensegrity::Status::kOk) {
-      std::fprintf(stderr, "%s: %s\n", name, tensegrity::to_string(status));
-      std::exit(1);
-    }
-    times.push_back(time.count());
-  }
-  std::sort(times.begin(), times.end());
-  const double least = times.front(), median = times[times.size() / 2];
-  std::printf("| %s, %s | %d | %d | %.3f | %.3f | %.0f |\n", name,
-              sizeof(Scalar) == 4 ? "float" : "double", int(robot.net.rods.size()),
-              int(start.rows()), least, median, 1e6 * least / double(start.rows()) / kSteps);
+void add_case(Program& program, const std::string& name, const Robot<Scalar>& robot) {
+  const int rods = int(robot.net.rods.size());
+  program.add("dynamics/" + name + "/" + std::to_string(rods) + "/" +
+                  (sizeof(Scalar) == 4 ? "float" : "double"),
+              [robot, name] {
+                const Eigen::Index n3 = robot.positions.size();
+                // Sigma points: the mean, and pairs with one coordinate displaced.
+                typename Simulator<Scalar>::States start(4 * n3 + 1, 2 * n3);
+                start.leftCols(n3).rowwise() =
+                    Eigen::Map<const Eigen::RowVectorXd>(robot.positions.data(), n3).cast<Scalar>();
+                start.rightCols(n3).setZero();
+                for (Eigen::Index c = 0; c < 2 * n3; ++c) {
+                  start(1 + c, c) += Scalar(0.02);
+                  start(1 + 2 * n3 + c, c) -= Scalar(0.02);
+                }
+                typename Simulator<Scalar>::Vector rest(Eigen::Index(robot.net.cables.size()));
+                for (Eigen::Index k = 0; k < rest.size(); ++k) {
+                  rest[k] = robot.net.cables[std::size_t(k)].rest_length;
+                }
+                return [simulator = Simulator<Scalar>(robot.net), start, states = start, rest,
+                        name]() mutable {
+                  states = start;
+                  const auto status = simulator.step(states, rest, Scalar(0.005), 20);
+                  if (status != tensegrity::Status::kOk) {
+                    std::fprintf(stderr, "%s: %s\n", name.c_str(), tensegrity::to_string(status));
+                    std::exit(1);
+                  }
+                };
+              },
+              {1, rods > 12 ? 0 : 2});
 }
 
 }  // namespace
 
-int main() {
-  std::printf("| net | rods | simulations | least [ms] | median [ms] | per step [ns] |\n");
-  std::printf("|---|--:|--:|--:|--:|--:|\n");
-  report("SUPERball", superball<double>());
-  report("SUPERball", superball<float>());
+int main(int argc, char** argv) {
+  Program program(argc, argv);
+  add_case(program, "superball", superball<double>());
+  add_case(program, "superball", superball<float>());
   for (const int rods : {3, 6, 12, 24, 48}) {
-    report("prism", prism<double>(rods));
-    report("prism", prism<float>(rods));
+    add_case(program, "prism", prism<double>(rods));
+    add_case(program, "prism", prism<float>(rods));
   }
+  return program.run();
 }

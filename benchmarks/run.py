@@ -1,0 +1,311 @@
+"""Builds and runs every timing benchmark: `results.json` and the page made from it.
+
+    python benchmarks/run.py             # or: make bench
+    python benchmarks/run.py --resume    # after an interruption: what has finished is not repeated
+
+Times are CPU times; of each the median, least and greatest of seven repetitions. Instructions are
+counted by callgrind, on the same programs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import report
+from callgrind import Counts, counts, worst_calls
+from results import Results, Timing
+
+import tensegrity.sequence
+from tensegrity.simulation import SimulationOptions, simulate
+
+ROOT = Path(__file__).resolve().parents[1]
+DATA = ROOT.parent / "shared" / "data"
+RECORDINGS = {"forward": "forward", "right": "right-turn"}
+"""Names of recordings, and the manoeuvres that replace them where there are none."""
+RANGES = ("building45", "outdoor", "rolling_indoor")
+TIMING = (
+    "--benchmark_repetitions=7",
+    "--benchmark_min_time=0.1",
+    "--benchmark_enable_random_interleaving=true",
+)
+# Symbols are bound at the start, not by the first call that is counted.
+COUNTING = (
+    "env",
+    "LD_BIND_NOW=1",
+    "valgrind",
+    "-q",
+    "--tool=callgrind",
+    "--callgrind-out-file=/dev/null",
+)
+
+PROGRAMS = ("filter", "tight", "shape", "contact", "cycle", "dynamics", "unscented")
+WITH_RECORDINGS = ("shape", "contact", "cycle")
+COUNTED = ("filter", "tight", "shape", "contact", "dynamics", "unscented")
+COUNTED_CYCLES = ("paper", "full")
+
+
+@dataclass(frozen=True)
+class Build:
+    """Where things go, and the flags they are built with."""
+
+    folder: Path
+    march: str = "native"
+
+    @property
+    def flags(self) -> str:
+        return f"-O3 -DNDEBUG -march={self.march}"
+
+    def program(self, name: str) -> Path:
+        return self.folder / "cmake" / "benchmarks" / "cpp" / name
+
+
+def run(command: list[str], **options: Any) -> str:
+    """Its output; a failure shows all of it and ends the run."""
+    shown = " ".join(
+        os.path.relpath(word, ROOT) if word.startswith("/") else word for word in command
+    )
+    print(f"$ {shown}", file=sys.stderr, flush=True)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, **options)
+    if done.returncode != 0:
+        raise SystemExit(f"error: {shown}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def build(where: Build) -> None:
+    """All programs, in optimised C++."""
+    folder = str(where.folder / "cmake")
+    definitions = {
+        "CMAKE_BUILD_TYPE": "Release",
+        "CMAKE_CXX_FLAGS_RELEASE": where.flags,
+        "TENSEGRITY_BUILD_BENCHMARKS": "ON",
+    }
+    run(["cmake", "-S", str(ROOT), "-B", folder, "-G", "Ninja",
+         *(f"-D{name}={value}" for name, value in definitions.items())])  # fmt: skip
+    jobs = os.environ.get("JOBS", str(os.cpu_count() or 1))
+    run(["cmake", "--build", folder, "-j", jobs])
+
+
+def recordings(folder: Path) -> list[Path]:
+    """The shared recordings, or simulated ones in their place."""
+    paths = []
+    for name, manoeuvre in RECORDINGS.items():
+        shared, simulated = DATA / "prism3" / name, folder / "recordings" / name
+        if not shared.is_dir() and not simulated.is_dir():
+            sequence = simulate(manoeuvre, SimulationOptions(seed=0))
+            tensegrity.sequence.write(sequence, simulated)
+        paths.append(shared if shared.is_dir() else simulated)
+    return paths
+
+
+# --- stages: each returns what is stored as JSON until the run is complete ----------------------
+
+
+def time_program(where: Build, name: str, paths: list[Path]) -> dict[str, Any]:
+    """Timings by case."""
+    out = where.folder / f"{name}.google.json"
+    run([str(where.program(name)), *(map(str, paths) if name in WITH_RECORDINGS else ()),
+         f"--benchmark_out={out}", "--benchmark_out_format=json", *TIMING])  # fmt: skip
+    times: dict[str, list[float]] = {}
+    heap: dict[str, int] = {}
+    for case in json.loads(out.read_text(encoding="utf-8"))["benchmarks"]:
+        if case["run_type"] != "iteration":
+            continue
+        if case["time_unit"] != "ns":
+            raise RuntimeError(f"{case['name']}: expected nanoseconds, not {case['time_unit']}")
+        times.setdefault(case["run_name"], []).append(case["cpu_time"] / case["calls"])
+        heap[case["run_name"]] = int(case["bytes"])
+    return {"times": {case: (values, heap[case]) for case, values in times.items()}}
+
+
+def time_cycles(where: Build, paths: list[Path]) -> dict[str, Any]:
+    """Median and worst of single cycles."""
+    output = run([str(where.program("cycle")), *map(str, paths), "--each"])
+    return {"cycles": json.loads(output)}
+
+
+def time_python(name: str, paths: list[Path]) -> dict[str, Any]:
+    """Times by case and versions of peers."""
+    output = run([sys.executable, str(ROOT / "benchmarks" / "python" / name), *map(str, paths)])
+    handed_over = json.loads(output)
+    return {
+        "times": {case: (times, 0) for case, times in handed_over["times_ns"].items()},
+        "versions": handed_over["versions"],
+    }
+
+
+def count(where: Build, name: str, log: Path, *arguments: str) -> Counts:
+    """What a program counts under callgrind."""
+    program = [str(where.program(name)), *arguments, "--count"]
+    return counts(log, run([*COUNTING, f"--log-file={log}", *program]))
+
+
+def count_program(where: Build, name: str, paths: list[Path]) -> dict[str, Any]:
+    """Instructions per call of each case."""
+    log = where.folder / f"{name}.callgrind.log"
+    arguments = map(str, paths) if name in WITH_RECORDINGS else ()
+    return {"instructions": dict(count(where, name, log, *arguments))}
+
+
+def count_cycles(where: Build, method: str, paths: list[Path]) -> dict[str, Any]:
+    """Instructions of the worst calls of a method."""
+    log = where.folder / f"cycle-{method}.callgrind.log"
+    wanted = f"--benchmark_filter=^cycle/{method}/"
+    return {"worst_instructions": worst_calls(count(where, "cycle", log, *map(str, paths), wanted))}
+
+
+# --- machine ------------------------------------------------------------------------------------
+
+
+def cpu_information(key: str) -> str:
+    """A line of /proc/cpuinfo; empty where there is none."""
+    information = Path("/proc/cpuinfo")
+    text = information.read_text(encoding="utf-8") if information.is_file() else ""
+    found = re.search(rf"^{key}\s*:\s*(.*)$", text, re.MULTILINE)
+    return found[1].strip() if found else ""
+
+
+def machine() -> dict[str, str]:
+    return {
+        "processor": cpu_information("model name") or platform.processor() or platform.machine(),
+        "cores": str(os.cpu_count()),
+        "system": platform.platform(),
+    }
+
+
+def load() -> str:
+    return f"{os.getloadavg()[0]:.1f}"
+
+
+def versions(where: Build, counting: Build) -> dict[str, str]:
+    def first_line(*command: str) -> str:
+        return run(list(command)).splitlines()[0]
+
+    def debian(package: str) -> str:
+        return run(["dpkg-query", "-W", "-f", "${Version}", package])
+
+    return {
+        "tensegrity": tensegrity.__version__,
+        "commit": first_line("git", "describe", "--always", "--dirty"),
+        "compiler": first_line("c++", "--version"),
+        "flags": where.flags,
+        "flags where instructions are counted": counting.flags,
+        "Eigen": debian("libeigen3-dev"),
+        "Google Benchmark": debian("libbenchmark-dev"),
+        "Ipopt": debian("coinor-libipopt-dev"),
+        "valgrind": debian("valgrind"),
+        "Python": platform.python_version(),
+        "numpy": version("numpy"),
+    }
+
+
+# --- all of it ----------------------------------------------------------------------------------
+
+
+class Stages:
+    """Runs each stage once and keeps its result in a file, so that a run can be resumed."""
+
+    def __init__(self, folder: Path, resume: bool) -> None:
+        self._folder = folder / "stages"
+        if not resume:
+            shutil.rmtree(self._folder, ignore_errors=True)
+        self._folder.mkdir(parents=True, exist_ok=True)
+
+    def run(self, name: str, stage: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        file = self._folder / f"{name}.json"
+        if not file.is_file():
+            result = stage()
+            part = file.with_suffix(".part")
+            part.write_text(json.dumps(result), encoding="utf-8")
+            part.rename(file)
+        stored: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        return stored
+
+
+def measure(where: Build, resume: bool) -> Results:
+    results = Results(machine())
+    results.machine["load before"] = load()
+    # valgrind does not know AVX-512.
+    avx512 = "avx512f" in cpu_information("flags").split()
+    counting = Build(where.folder / "x86-64-v3", "x86-64-v3") if avx512 else where
+    for each in {where, counting}:
+        each.folder.mkdir(parents=True, exist_ok=True)
+        build(each)
+    paths = recordings(where.folder)
+    for path in paths:
+        sequence = tensegrity.sequence.read(path)
+        results.recordings[path.name] = {
+            "samples": len(sequence.imu.t_ns),
+            "duration_s": sequence.duration_s,
+        }
+    results.versions = versions(where, counting)
+    results.commands = [
+        " ".join(["PROGRAM [RECORDING...]", *TIMING]),
+        " ".join([*COUNTING, "PROGRAM [RECORDING...] --count"]),
+    ]
+    stages = Stages(where.folder, resume)
+
+    def keep(stored: dict[str, Any]) -> None:
+        for case, (times, heap) in stored.pop("times", {}).items():
+            results.times[case] = Timing.of(times, heap)
+        for part, values in stored.items():
+            getattr(results, part).update(values)
+
+    # Times one after the other, so that they do not disturb each other.
+    for name in PROGRAMS:
+        keep(stages.run(f"time-{name}", lambda name=name: time_program(where, name, paths)))
+    keep(stages.run("time-cycles", lambda: time_cycles(where, paths)))
+    keep(stages.run("time-replay", lambda: time_python("replay.py", paths)))
+    keep(stages.run("time-peers", lambda: time_python("peers.py", paths[-1:])))
+    ranges = [path for name in RANGES if (path := DATA / "superball" / name).is_dir()]
+    if ranges:
+        keep(stages.run("time-calibration", lambda: time_python("calibration.py", ranges)))
+    results.machine["load after"] = load()
+    # Counts do not care.
+    counting_stages: dict[str, Callable[[], dict[str, Any]]] = {
+        **{
+            f"count-cycles-{method}": lambda method=method: count_cycles(counting, method, paths)
+            for method in COUNTED_CYCLES
+        },
+        **{
+            f"count-{name}": lambda name=name: count_program(counting, name, paths)
+            for name in COUNTED
+        },
+    }
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for stored in pool.map(stages.run, counting_stages.keys(), counting_stages.values()):
+            keep(stored)
+    return results
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--resume", action="store_true", help="keep what an earlier run measured")
+    parser.add_argument("--build", type=Path, default=ROOT / "build" / "bench", metavar="FOLDER")
+    arguments = parser.parse_args()
+    started = datetime.datetime.now(datetime.UTC)
+    results = measure(Build(arguments.build.resolve()), arguments.resume)
+    results.machine["date"] = started.date().isoformat()
+    results.write()
+    page = report.page(results)
+    report.PAGE.write_text(page, encoding="utf-8")
+    print(page)
+
+
+if __name__ == "__main__":
+    main()
