@@ -1,5 +1,7 @@
 #include <doctest/doctest.h>
 
+#include <initializer_list>
+
 #include "tensegrity/math/chi_square.hpp"
 
 TEST_CASE("chi-square quantiles equal scipy.stats.chi2.ppf") {

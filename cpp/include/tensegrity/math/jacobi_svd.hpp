@@ -73,21 +73,28 @@ class JacobiSvd {
     }
   }
 
-  // However small it is, a column that is orthogonal to all others has a direction. Only one whose
-  // square is below the range of numbers has none: any that completes U will do.
+  // However small it is, a column that is orthogonal to the others has a direction. One that is
+  // nothing but rounding can be left parallel to them, and one whose square is below the range of
+  // numbers has no direction: there any column that completes U will do.
   void normalise() {
+    constexpr Scalar kSmallestSquare =
+        std::numeric_limits<Scalar>::min() / std::numeric_limits<Scalar>::epsilon();
     for (int j = 0; j < N; ++j) {
-      const Scalar square = u_.col(j).squaredNorm();
-      if (square * std::numeric_limits<Scalar>::epsilon() < std::numeric_limits<Scalar>::min()) {
-        complete(j);
-      } else {
+      if (u_.col(j).squaredNorm() > kSmallestSquare) {
         u_.col(j) /= singular_values_[j];
+        remove_previous(j);
       }
+      if (!(u_.col(j).squaredNorm() > Scalar(0.5))) {
+        u_.col(j) = Vector<Scalar, N>::Unit(least_spanned(j));
+        remove_previous(j);
+        remove_previous(j);  // what rounding left
+      }
+      u_.col(j).normalize();
     }
   }
 
-  // Column j of U from the ones before it: the unit vector that they span least of, across them.
-  void complete(int j) {
+  // The axis that the columns of U before `j` span least of.
+  int least_spanned(int j) const {
     int axis = 0;
     Scalar least = std::numeric_limits<Scalar>::max();
     for (int i = 0; i < N; ++i) {
@@ -98,11 +105,11 @@ class JacobiSvd {
         axis = i;
       }
     }
-    Vector<Scalar, N> column = Vector<Scalar, N>::Unit(axis);
-    for (int pass = 0; pass < 2; ++pass) {  // the second takes away what rounding left
-      for (int k = 0; k < j; ++k) column -= u_.col(k).dot(column) * u_.col(k);
-    }
-    u_.col(j) = column.normalized();
+    return axis;
+  }
+
+  void remove_previous(int j) {
+    for (int k = 0; k < j; ++k) u_.col(j) -= u_.col(k).dot(u_.col(j)) * u_.col(k);
   }
 
   Matrix<Scalar, N> u_;  // A V until it is normalised
