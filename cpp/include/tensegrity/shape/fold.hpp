@@ -31,7 +31,7 @@ TangentMatrix<Scalar> bordered_jacobian(const Rods<Scalar>& rods) {
 // prism takes that stands loaded by gravity (about 0.4 for the robot of T at rest). `moment_sign`
 // (Prism::moment_sign) gives the mirror image of a shape the same value.
 //
-// Value and gradient come from one factorisation; the gradient costs as much again.
+// Value and gradient come from one elimination.
 template <typename Scalar>
 class Fold {
  public:
