@@ -77,6 +77,13 @@ TEST_CASE("first and second derivatives agree with finite differences") {
         CHECK(hessian(j, i) == doctest::Approx(hessian(i, j)).epsilon(1e-9).scale(1));
       }
     }
+    Matrix<double, kTangent, 9> vectors;
+    Tangent<double> sum = Tangent<double>::Zero();
+    for (int k = 0; k < 9; ++k) {
+      vectors.col(k) = samples.normal<kTangent>(1);
+      sum += weighted_length_hessian<double>(rods, Vector<double, 9>::Unit(k)) * vectors.col(k);
+    }
+    CHECK((length_hessian_products(rods, vectors) - sum).norm() < 1e-12);
     const auto distance = [](const Rods<double>& r) { return Vector<double, 1>(fold(r, -1.0)); };
     CHECK((fold_gradient(rods, -1.0).transpose() - differences<1>(rods, distance)).norm() < 1e-5);
   }
@@ -176,6 +183,16 @@ TEST_CASE("singular vectors across the spin diagonalise the length Jacobian") {
         1e-10);
   CHECK((jacobian.transpose() * analysis.self_stress).norm() ==
         doctest::Approx(analysis.smallest()).epsilon(1e-6));
+}
+
+TEST_CASE("the gradient of fold is exact on the fold") {
+  const Prism<double> prism;
+  const Rods<double> rods(prism, prism.undeformed());
+  const Fold<double> on_fold(rods, -1.0);
+  CHECK(std::abs(on_fold.value()) < 1e-12);
+  const auto distance = [](const Rods<double>& r) { return Vector<double, 1>(fold(r, -1.0)); };
+  CHECK((on_fold.gradient().transpose() - differences<1>(rods, distance)).norm() < 1e-6);
+  CHECK(on_fold.gradient().norm() > 1);
 }
 
 TEST_CASE("fold has one sign for a robot and its mirror image, and changes it across the fold") {

@@ -197,6 +197,7 @@ TEST_CASE("covariances are symmetric, positive semi-definite and blind to the sp
   }
   CHECK(solver.covariance(-1, covariance) == Status::kOutOfRange);
   CHECK(solver.covariance(0.002, 0, covariance) == Status::kOutOfRange);
+  CHECK(solver.covariance(1e-200, 0.02, covariance) == Status::kOutOfRange);  // its square is 0
   CHECK(solver.covariance(kNaN, covariance) == Status::kNotFinite);
 }
 

@@ -44,11 +44,9 @@ class LooseFilter {
         solver_(robot, solver_options()),
         tracker_(robot),
         detector_(robot) {
+    if (!(config.chi_square_gate > 0)) return;
     for (int contacts = 1; contacts <= MaxContacts; ++contacts) {
-      gates_[std::size_t(contacts)] =
-          config.chi_square_gate > 0
-              ? Scalar(chi_square_quantile(double(config.chi_square_gate), 3 * contacts))
-              : Scalar(0);
+      gates_[std::size_t(contacts)] = chi_square_quantile(config.chi_square_gate, 3 * contacts);
     }
   }
 
@@ -89,7 +87,7 @@ class LooseFilter {
       return Status::kNotFinite;
     }
     const Scalar dt =
-        shape_seen_ ? std::max(Scalar(double(t - shape_time_) * 1e-9), Scalar(0)) : Scalar(0);
+        shape_seen_ ? std::max(Scalar(t - shape_time_) * Scalar(1e-9), Scalar(0)) : Scalar(0);
     shape_time_ = t;
     shape_seen_ = true;
     const Endcaps<Scalar> before = endcaps_;
@@ -178,7 +176,7 @@ class LooseFilter {
   // The force fixes the tilt only as well as the accelerometer's bias is known: the update keeps
   // their correlation.
   void start_attitude(const AtRest<Scalar>& rest) {
-    belief_ = Belief{};
+    belief_.reset();
     const V3 force = stand_still(belief_, rest, config_);
     auto& p = belief_.covariance;
     // R (mean - b_a) + g = g x xi_R - R zeta_a + R n at rest.

@@ -138,7 +138,7 @@ class PrismEstimator {
   static constexpr Scalar kLargestForce = Scalar(20000);  // [m/s^2], 2000 g
 
   static Scalar seconds(Nanoseconds from, Nanoseconds to) {
-    return Scalar(double(to - from) * 1e-9);
+    return Scalar(to - from) * Scalar(1e-9);
   }
 
   // ---- input checks

@@ -138,7 +138,7 @@ class TightFilter {
       ++health.shape_failures;
       return false;
     }
-    belief_ = Belief(robot_);
+    belief_.reset();
     const V3 force = stand_still(belief_, rest, config_);
     auto& p = belief_.covariance;
     p(Belief::kPosition + 2, Belief::kPosition + 2) = square(kStartHeightStd);

@@ -38,16 +38,32 @@ struct Belief {
   using Covariance = Matrix<Scalar, padded(MaxDim)>;
   using ErrorVector = Vector<Scalar, padded(MaxDim)>;
 
-  Matrix3<Scalar> rotation = Matrix3<Scalar>::Identity();  // R, body to world
-  Vector3<Scalar> velocity = Vector3<Scalar>::Zero();      // v, world [m/s]
-  Vector3<Scalar> position = Vector3<Scalar>::Zero();      // p, world [m]
-  Vector3<Scalar> gyro_bias = Vector3<Scalar>::Zero();     // b_g, body [rad/s]
-  Vector3<Scalar> accel_bias = Vector3<Scalar>::Zero();    // b_a, body [m/s^2]
-  Vector<Scalar, Extra> extra = Vector<Scalar, Extra>::Zero();
-  Matrix<Scalar, 3, MaxAnchors> anchors = Matrix<Scalar, 3, MaxAnchors>::Zero();  // d_i, world [m]
-  std::array<int, MaxAnchors> anchor_ids{};  // which endcap each anchor belongs to
-  int anchor_count = 0;
-  Covariance covariance = Covariance::Zero();
+  Belief() { reset(); }
+
+  // Back to how it was constructed. In place: a second covariance is much of a small stack.
+  void reset() {
+    rotation.setIdentity();
+    velocity.setZero();
+    position.setZero();
+    gyro_bias.setZero();
+    accel_bias.setZero();
+    extra.setZero();
+    anchors.setZero();
+    anchor_ids.fill(0);
+    anchor_count = 0;
+    covariance.setZero();
+  }
+
+  Matrix3<Scalar> rotation;    // R, body to world
+  Vector3<Scalar> velocity;    // v, world [m/s]
+  Vector3<Scalar> position;    // p, world [m]
+  Vector3<Scalar> gyro_bias;   // b_g, body [rad/s]
+  Vector3<Scalar> accel_bias;  // b_a, body [m/s^2]
+  Vector<Scalar, Extra> extra;
+  Matrix<Scalar, 3, MaxAnchors> anchors;   // d_i, world [m]
+  std::array<int, MaxAnchors> anchor_ids;  // which endcap each anchor belongs to
+  int anchor_count;
+  Covariance covariance;
 
   int dim() const { return kAnchors + 3 * anchor_count; }
   static constexpr int anchor_index(int slot) { return kAnchors + 3 * slot; }

@@ -99,4 +99,43 @@ TangentMatrix<Scalar> weighted_length_hessian(const Rods<Scalar>& rods,
   return hessian;
 }
 
+// Sum over the cables of d2l/dtangent2 times that cable's column of `vectors` (10 x 9). A cable
+// curves as in `weighted_length_hessian`, whose 10 x 10 are never formed: it has two ends only.
+template <typename Scalar>
+Tangent<Scalar> length_hessian_products(const Rods<Scalar>& rods,
+                                        const Matrix<Scalar, kTangent, 9>& vectors) {
+  const Endcaps<Scalar> q = rods.endcaps();
+  Tangent<Scalar> sum = Tangent<Scalar>::Zero();
+  for (int column = 0; column < 9; ++column) {
+    const Cable cable = kPrismCables[static_cast<std::size_t>(column)];
+    Scalar length;
+    const Vector3<Scalar> n = detail::cable_direction(q, cable, length);
+    if (length <= 0) continue;
+    Vector3<Scalar> parting = Vector3<Scalar>::Zero();  // of the ends
+    const auto add_motion = [&](int endcap, Scalar sign) {
+      const int k = free_rod(endcap);
+      if (k < 0) return;
+      const Vector3<Scalar> centre = vectors.template block<3, 1>(5 * k, column);
+      const Vector<Scalar, 2> turn = vectors.template block<2, 1>(5 * k + 3, column);
+      parting += sign * (centre + Scalar(rod_side(endcap)) * (rods.rod(k).across() * turn));
+    };
+    add_motion(cable.from, Scalar(1));
+    add_motion(cable.to, Scalar(-1));
+    const Vector3<Scalar> across = (parting - n * n.dot(parting)) / length;
+    const auto add_end = [&](int endcap, Scalar sign) {
+      const int k = free_rod(endcap);
+      if (k < 0) return;
+      const Scalar side = sign * Scalar(rod_side(endcap));
+      const Scalar inward = -side * n.dot(rods.rod(k).direction());
+      sum.template segment<3>(5 * k) += sign * across;
+      sum.template segment<2>(5 * k + 3) +=
+          side * (rods.rod(k).across().transpose() * across) +
+          inward / rods.half_length() * vectors.template block<2, 1>(5 * k + 3, column);
+    };
+    add_end(cable.from, Scalar(1));
+    add_end(cable.to, Scalar(-1));
+  }
+  return sum;
+}
+
 }  // namespace tensegrity::shape

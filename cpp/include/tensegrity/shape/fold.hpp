@@ -7,10 +7,8 @@
 // the unit spin tangent; how close it is to the fold shows in its size.
 #pragma once
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
-#include <cmath>
-
+#include "tensegrity/math/determinant.hpp"
+#include "tensegrity/math/jacobi_svd.hpp"
 #include "tensegrity/shape/cables.hpp"
 #include "tensegrity/shape/gauge.hpp"
 
@@ -27,52 +25,45 @@ TangentMatrix<Scalar> bordered_jacobian(const Rods<Scalar>& rods) {
   return bordered;
 }
 
-// Cofactor matrix, d det(A) / dA. Exact for a singular matrix too, as long as its rank deficiency
-// is one: with complete pivoting only the last pivot p can then vanish, and
-//   adj([U1 u; 0 p]) = det(U1) [p U1^-1, -U1^-1 u; 0, 1].
-template <typename Scalar>
-TangentMatrix<Scalar> cofactors(const TangentMatrix<Scalar>& matrix) {
-  constexpr int n = kTangent - 1;
-  const Eigen::FullPivLU<TangentMatrix<Scalar>> lu(matrix);  // P A Q = L U
-  const TangentMatrix<Scalar>& factors = lu.matrixLU();
-  const Matrix<Scalar, n> u1 = factors.template topLeftCorner<n, n>();
-  const auto upper = u1.template triangularView<Eigen::Upper>();
-  TangentMatrix<Scalar> adjugate = TangentMatrix<Scalar>::Zero();  // of U, over det(U1)
-  adjugate.template topLeftCorner<n, n>().diagonal().setConstant(factors(n, n));
-  adjugate.template topRightCorner<n, 1>() = -factors.template topRightCorner<n, 1>();
-  upper.solveInPlace(adjugate.template topRows<n>());
-  adjugate(n, n) = 1;
-  // adj(A) = det(P) det(Q) Q adj(U) L^-1 P, and the cofactors are its transpose.
-  factors.template triangularView<Eigen::UnitLower>().template solveInPlace<Eigen::OnTheRight>(
-      adjugate);
-  const Scalar scale = Scalar(lu.permutationP().determinant() * lu.permutationQ().determinant()) *
-                       u1.diagonal().prod();
-  adjugate = (lu.permutationQ() * adjugate * lu.permutationP()).eval();
-  return scale * adjugate.transpose();
-}
-
 }  // namespace detail
 
 // +-det[J; t], dimensionless: zero on the fold and positive on the branch of smaller twist, which a
 // prism takes that stands loaded by gravity (about 0.4 for the robot of T at rest). `moment_sign`
 // (Prism::moment_sign) gives the mirror image of a shape the same value.
+//
+// Value and gradient come from one elimination.
+template <typename Scalar>
+class Fold {
+ public:
+  Fold(const Rods<Scalar>& rods, Scalar moment_sign)
+      : rods_(rods), determinant_(detail::bordered_jacobian(rods)), sign_(-moment_sign) {}
+
+  Scalar value() const { return sign_ * determinant_.value(); }
+
+  // With respect to the tangent [1/m], exact on the fold as well.
+  Tangent<Scalar> gradient() const {
+    // d det = sum_ij C_ij dA_ij, C the cofactors. The last row adds nothing: its cofactors are
+    // parallel to t (both are orthogonal to every row of J), and a unit vector changes across
+    // itself.
+    const TangentMatrix<Scalar> cofactors = determinant_.cofactors();
+    return sign_ *
+           length_hessian_products<Scalar>(rods_, cofactors.template topRows<9>().transpose());
+  }
+
+ private:
+  Rods<Scalar> rods_;
+  Determinant<Scalar, kTangent> determinant_;
+  Scalar sign_;
+};
+
 template <typename Scalar>
 Scalar fold(const Rods<Scalar>& rods, Scalar moment_sign) {
-  return -moment_sign * detail::bordered_jacobian(rods).determinant();
+  return Fold<Scalar>(rods, moment_sign).value();
 }
 
-// Gradient of `fold` with respect to the tangent [1/m], exact at the fold as well.
 template <typename Scalar>
 Tangent<Scalar> fold_gradient(const Rods<Scalar>& rods, Scalar moment_sign) {
-  const TangentMatrix<Scalar> cofactors = detail::cofactors(detail::bordered_jacobian(rods));
-  // d det = sum_ij C_ij dA_ij. The last row adds nothing: its cofactors are parallel to t (both are
-  // orthogonal to every row of J), and a unit vector changes across itself.
-  Tangent<Scalar> gradient = Tangent<Scalar>::Zero();
-  for (int k = 0; k < 9; ++k) {
-    gradient += weighted_length_hessian<Scalar>(rods, Vector<Scalar, 9>::Unit(k)) *
-                cofactors.row(k).transpose();
-  }
-  return -moment_sign * gradient;
+  return Fold<Scalar>(rods, moment_sign).gradient();
 }
 
 // Singular value decomposition of J across the spin, with what the fold adds to first order.
@@ -94,15 +85,14 @@ FoldAnalysis<Scalar> analyse_fold(const Rods<Scalar>& rods) {
   // (|J| <= sqrt(trace J J') <= sqrt(18 * 2)) it comes first and the nine of J follow.
   const Scalar spin_weight = 10;
   bordered.template bottomRows<1>() *= spin_weight;
-  const Eigen::JacobiSVD<TangentMatrix<Scalar>, Eigen::NoQRPreconditioner> svd(
-      bordered, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const JacobiSvd<Scalar, kTangent> svd(bordered);
   FoldAnalysis<Scalar> analysis;
-  analysis.singular_values = svd.singularValues().template tail<9>();
-  analysis.motions = svd.matrixV().template rightCols<9>();
-  analysis.self_stress = svd.matrixU().col(9).template head<9>();
-  const TangentMatrix<Scalar> stiffness = weighted_length_hessian(rods, analysis.self_stress);
+  analysis.singular_values = svd.singular_values().template tail<9>();
+  analysis.motions = svd.v().template rightCols<9>();
+  analysis.self_stress = svd.u().col(9).template head<9>();
   const Tangent<Scalar> mechanism = analysis.mechanism();
-  analysis.curvature = mechanism.dot(stiffness * mechanism);
+  const Matrix<Scalar, kTangent, 9> stressed = mechanism * analysis.self_stress.transpose();
+  analysis.curvature = mechanism.dot(length_hessian_products(rods, stressed));
   return analysis;
 }
 

@@ -116,8 +116,11 @@ TangentMatrix<Scalar> gauge_projection(const Rods<Scalar>& rods, const Endcaps<S
 template <typename Scalar>
 Matrix<Scalar, 18> endcap_covariance(const Rods<Scalar>& rods, const TangentMatrix<Scalar>& tangent,
                                      const Endcaps<Scalar>& reference) {
-  const EndcapJacobian<Scalar> map = rods.endcap_jacobian() * gauge_projection(rods, reference);
-  const Matrix<Scalar, 18> covariance = map * tangent * map.transpose();
+  // Lazy products: others refer to the heap for operands of more than eight rows and columns.
+  const EndcapJacobian<Scalar> map =
+      rods.endcap_jacobian().lazyProduct(gauge_projection(rods, reference));
+  const EndcapJacobian<Scalar> spread = map.lazyProduct(tangent);
+  const Matrix<Scalar, 18> covariance = spread.lazyProduct(map.transpose());
   return (covariance + covariance.transpose()) / 2;
 }
 
@@ -132,8 +135,9 @@ void move_to_procrustes_gauge(Rods<Scalar>& rods, const Endcaps<Scalar>& referen
   const Matrix3<Scalar> rotation = Rods<Scalar>::rotation_about_z(angle);
   turn.template block<3, 3>(0, 0) = rotation;
   turn.template block<3, 3>(5, 5) = rotation;
-  const TangentMatrix<Scalar> map = gauge_projection(rods, reference) * turn;
-  const TangentMatrix<Scalar> moved = map * covariance * map.transpose();
+  const TangentMatrix<Scalar> map = gauge_projection(rods, reference).lazyProduct(turn);
+  const TangentMatrix<Scalar> spread = map.lazyProduct(covariance);
+  const TangentMatrix<Scalar> moved = spread.lazyProduct(map.transpose());
   covariance = (moved + moved.transpose()) / 2;
 }
 

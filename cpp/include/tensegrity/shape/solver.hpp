@@ -10,7 +10,6 @@
 // mirrored shape is reflected, a shape with crossed rods is started anew.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -130,10 +129,15 @@ class Solver {
       if (input != Status::kOk) return input;
     }
     const LengthJacobian<Scalar> jacobian = length_jacobian(rods_);
-    TangentMatrix<Scalar> information = jacobian.transpose() * jacobian / (cable_std * cable_std);
+    // Lazy products: others refer to the heap for operands of more than eight rows and columns.
+    TangentMatrix<Scalar> information =
+        jacobian.transpose().lazyProduct(jacobian) / (cable_std * cable_std);
     information.diagonal().array() += 1 / (prior_std * prior_std);
-    const Eigen::LLT<TangentMatrix<Scalar>> factor(information);
-    out = to_endcaps(factor.solve(TangentMatrix<Scalar>::Identity()));
+    Ldlt<Scalar, kTangent> factor;
+    if (!factor.factor(information)) return Status::kOutOfRange;  // beyond the range of Scalar
+    TangentMatrix<Scalar> tangent;
+    for (int k = 0; k < kTangent; ++k) tangent.col(k) = factor.solve(Tangent<Scalar>::Unit(k));
+    out = to_endcaps(tangent);
     return Status::kOk;
   }
 
@@ -147,7 +151,8 @@ class Solver {
     Vector<Scalar, 9> squared = analysis.singular_values.cwiseAbs2();
     squared[8] += sqrt_half_pi * std::abs(analysis.curvature) * cable_std;
     const Vector<Scalar, 9> variances = cable_std * cable_std * squared.cwiseInverse();
-    out = analysis.motions * variances.asDiagonal() * analysis.motions.transpose();
+    const Matrix<Scalar, kTangent, 9> spread = analysis.motions * variances.asDiagonal();
+    out = spread.lazyProduct(analysis.motions.transpose());
     return Status::kOk;
   }
 

@@ -10,11 +10,11 @@
 // after every step (gauge.hpp).
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "tensegrity/math/ldlt.hpp"
 #include "tensegrity/shape/solver.hpp"
 
 namespace tensegrity::shape {
@@ -94,7 +94,9 @@ class Tracker {
 
     Rods<Scalar> rods = rods_;
     TangentMatrix<Scalar> covariance = covariance_;
-    update_lengths(lengths, cable_std, usable, rods, covariance);
+    if (!update_lengths(lengths, cable_std, usable, rods, covariance)) {
+      return reject(lengths, cable_std);
+    }
     update_fold(rods, covariance);
     if (!credible(rods, covariance)) return reject(lengths, cable_std);
     rods_ = rods;
@@ -157,8 +159,8 @@ class Tracker {
 
   // One update with all usable cables at once. Linearised at the prediction on purpose:
   // relinearised at its own result, next to the fold, the update was less accurate and more sure of
-  // itself.
-  void update_lengths(const CableLengths<Scalar>& lengths, Scalar cable_std, const Mask& usable,
+  // itself. False if the spread of the lengths has no inverse.
+  bool update_lengths(const CableLengths<Scalar>& lengths, Scalar cable_std, const Mask& usable,
                       Rods<Scalar>& rods, TangentMatrix<Scalar>& covariance) const {
     LengthJacobian<Scalar> jacobian = length_jacobian(rods);
     CableLengths<Scalar> innovation = lengths - cable_lengths(rods.endcaps());
@@ -169,16 +171,23 @@ class Tracker {
       innovation[k] = 0;
     }
     const Scalar variance = cable_std * cable_std;
-    const Matrix<Scalar, kTangent, 9> cross = covariance * jacobian.transpose();
-    Matrix<Scalar, 9> spread = jacobian * cross;
+    // Lazy products: others refer to the heap for operands of more than eight rows and columns.
+    const LengthJacobian<Scalar> cross = jacobian.lazyProduct(covariance);
+    Matrix<Scalar, 9> spread = cross.lazyProduct(jacobian.transpose());
     spread.diagonal().array() += variance;
-    const Matrix<Scalar, kTangent, 9> gain = spread.llt().solve(cross.transpose()).transpose();
+    Ldlt<Scalar, 9> factors;
+    if (!factors.factor(spread)) return false;
+    Matrix<Scalar, kTangent, 9> gain;
+    for (int i = 0; i < kTangent; ++i) gain.row(i) = factors.solve(cross.col(i)).transpose();
     rods.retract(gain * innovation);
     // Joseph's form (I - K J) P (I - K J)' + K R K' stays positive semi-definite under rounding.
-    const TangentMatrix<Scalar> keep = TangentMatrix<Scalar>::Identity() - gain * jacobian;
+    const TangentMatrix<Scalar> keep =
+        TangentMatrix<Scalar>::Identity() - gain.lazyProduct(jacobian);
+    const TangentMatrix<Scalar> kept = keep.lazyProduct(covariance);
     const TangentMatrix<Scalar> updated =
-        keep * covariance * keep.transpose() + variance * gain * gain.transpose();
+        kept.lazyProduct(keep.transpose()) + variance * gain.lazyProduct(gain.transpose());
     covariance = (updated + updated.transpose()) / 2;
+    return true;
   }
 
   // The soft one-sided prior. It moves the shape but does not claim to have measured it: what the
@@ -186,10 +195,10 @@ class Tracker {
   // would make the covariance too small.
   void update_fold(Rods<Scalar>& rods, const TangentMatrix<Scalar>& covariance) const {
     if (!(options_.fold_std > 0)) return;
-    const Scalar sign = prism_.moment_sign();
-    const Scalar missing = options_.fold_threshold - shape::fold(rods, sign);
+    const Fold<Scalar> fold(rods, prism_.moment_sign());
+    const Scalar missing = options_.fold_threshold - fold.value();
     if (!(missing > 0)) return;
-    const Tangent<Scalar> gradient = fold_gradient(rods, sign);
+    const Tangent<Scalar> gradient = fold.gradient();
     const Tangent<Scalar> cross = covariance * gradient;
     const Scalar variance = gradient.dot(cross) + options_.fold_std * options_.fold_std;
     rods.retract(cross * (missing / variance));

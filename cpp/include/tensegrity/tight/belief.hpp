@@ -46,18 +46,29 @@ struct Belief {
   using Covariance = Matrix<Scalar, Dim>;
   using ErrorVector = Vector<Scalar, Dim>;
 
-  explicit Belief(const Prism<Scalar>& robot) : base{robot.endcap0(), robot.endcap1()} {}
+  explicit Belief(const Prism<Scalar>& robot) : base{robot.endcap0(), robot.endcap1()} { reset(); }
 
-  std::array<V3, 2> base;        // endcaps 0 and 1, body [m]
-  M3 rotation = M3::Identity();  // R
-  Matrix<Scalar, 3, kColumns> columns = Matrix<Scalar, 3, kColumns>::Zero();
-  V3 gyro_bias = V3::Zero();                              // b_g, body [rad/s]
-  V3 accel_bias = V3::Zero();                             // b_a, body [m/s^2]
-  Vector<Scalar, 9> offsets = Vector<Scalar, 9>::Zero();  // o, measured - true [m]
-  V3 ground = V3::Zero();                                 // m [m], [1], [1]
-  V3 rate = V3::Zero();                                   // angular, of the last step,
-                                                          // bias removed, body [rad/s]
-  Covariance covariance = Covariance::Zero();
+  // Back to how it was constructed. In place: a second covariance is much of a small stack.
+  void reset() {
+    rotation.setIdentity();
+    columns.setZero();
+    gyro_bias.setZero();
+    accel_bias.setZero();
+    offsets.setZero();
+    ground.setZero();
+    rate.setZero();
+    covariance.setZero();
+  }
+
+  std::array<V3, 2> base;  // endcaps 0 and 1, body [m]
+  M3 rotation;             // R
+  Matrix<Scalar, 3, kColumns> columns;
+  V3 gyro_bias;               // b_g, body [rad/s]
+  V3 accel_bias;              // b_a, body [m/s^2]
+  Vector<Scalar, 9> offsets;  // o, measured - true [m]
+  V3 ground;                  // m [m], [1], [1]
+  V3 rate;                    // angular, of the last step, bias removed, body [rad/s]
+  Covariance covariance;
 
   auto velocity() const { return columns.col(0); }  // [m/s]
   auto position() const { return columns.col(1); }  // [m]

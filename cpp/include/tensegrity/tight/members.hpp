@@ -94,9 +94,10 @@ template <typename Scalar>
 void hold_fold(Belief<Scalar>& belief, const Prism<Scalar>& robot, Scalar threshold, Scalar std) {
   using B = Belief<Scalar>;
   const shape::Rods<Scalar> rods(robot, belief.endcaps_body());
-  const Scalar fold = shape::fold(rods, robot.moment_sign());
-  if (!(fold < threshold)) return;
-  const shape::Tangent<Scalar> gradient = shape::fold_gradient(rods, robot.moment_sign());
+  const shape::Fold<Scalar> fold(rods, robot.moment_sign());
+  const Scalar value = fold.value();
+  if (!(value < threshold)) return;
+  const shape::Tangent<Scalar> gradient = fold.gradient();
   Row<Scalar> row;
   Vector3<Scalar> base = Vector3<Scalar>::Zero();
   for (int i = 2; i < 6; ++i) {
@@ -112,7 +113,7 @@ void hold_fold(Belief<Scalar>& belief, const Prism<Scalar>& robot, Scalar thresh
   }
   row.add(B::kPosition, base);
   SequentialUpdate<Scalar> update(belief);
-  update.correct(row, fold - threshold, std * std);
+  update.correct(row, value - threshold, std * std);
 }
 
 }  // namespace tensegrity::tight
