@@ -8,21 +8,24 @@
 #include <pybind11/stl.h>
 
 #include <array>
+#include <cstddef>
 
 #include "tensegrity/types.hpp"
 
 // A status is the result of every streaming call. py::native_enum makes it by a call into Python,
-// as long as the rest of the call together; the members are looked up once and kept instead.
+// which takes longer than all else of the binding; the members are looked up once and kept. Here,
+// because every file of the module has to see the same caster.
 namespace pybind11::detail {
 
 template <>
 struct type_caster_enum_type_enabled<tensegrity::Status> : std::false_type {};
 
 template <>
-struct type_caster<tensegrity::Status> {
+class type_caster<tensegrity::Status> {
   using Status = tensegrity::Status;
   using General = type_caster_enum_type<Status>;
 
+ public:
   static constexpr auto name = General::name;
   template <typename T>
   using cast_op_type = detail::cast_op_type<T>;

@@ -4,9 +4,11 @@
 #include <pybind11/functional.h>
 
 #include <chrono>
+#include <optional>
 #include <variant>
 
 #include "bindings.hpp"
+#include "numbers.hpp"
 
 namespace tensegrity::bindings {
 
@@ -22,10 +24,16 @@ using Stamps = py::array_t<std::int64_t, py::array::c_style | py::array::forceca
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Bools = py::array_t<bool, py::array::c_style | py::array::forcecast>;
 
-// Either filter behind one interface: Python chooses by the configuration.
+// Either filter behind one interface, for Python chooses by the configuration; and the robot's
+// corrections of what its sensors say, which are part of the robot's description in Python.
 class Estimator {
  public:
-  Estimator(const Prism<double>& robot, const Config& config, bool tight) {
+  // imu_rotation: from the frame of the base rod's IMU to the body frame. cable_offsets [m] are
+  // taken off the lengths. Without them samples stay as they are, to the last bit.
+  Estimator(const Prism<double>& robot, const Config& config, bool tight,
+            const std::optional<Matrix3<double>>& imu_rotation,
+            const std::optional<CableLengths<double>>& cable_offsets)
+      : imu_rotation_(imu_rotation), cable_offsets_(cable_offsets) {
     if (tight) {
       any_.emplace<Tight>(robot, config);
     } else {
@@ -34,10 +42,10 @@ class Estimator {
   }
 
   Status imu(Nanoseconds t, const V3& gyro, const V3& accel) {
-    return visit([&](auto& e) { return e.imu(t, gyro, accel); });
+    return visit([&](auto& e) { return e.imu(t, to_body(gyro), to_body(accel)); });
   }
   Status cables(Nanoseconds t, const CableLengths<double>& lengths) {
-    return visit([&](auto& e) { return e.cables(t, lengths); });
+    return visit([&](auto& e) { return e.cables(t, without_offsets(lengths)); });
   }
   Status rod_imu(Nanoseconds t, int rod, const V3& gyro, const V3& accel) {
     return visit([&](auto& e) { return e.rod_imu(t, rod, gyro, accel); });
@@ -51,6 +59,9 @@ class Estimator {
   State state() const {
     return std::visit([](const auto& e) { return e.state(); }, any_);
   }
+  State state_without_shape_covariance() const {
+    return std::visit([](const auto& e) { return e.state_without_shape_covariance(); }, any_);
+  }
 
  private:
   template <typename Call>
@@ -58,6 +69,13 @@ class Estimator {
     return std::visit(call, any_);
   }
 
+  V3 to_body(const V3& v) const { return imu_rotation_ ? V3(*imu_rotation_ * v) : v; }
+  CableLengths<double> without_offsets(const CableLengths<double>& lengths) const {
+    return cable_offsets_ ? CableLengths<double>(lengths - *cable_offsets_) : lengths;
+  }
+
+  std::optional<Matrix3<double>> imu_rotation_;
+  std::optional<CableLengths<double>> cable_offsets_;
   std::variant<Loose, Tight> any_;
 };
 
@@ -76,85 +94,131 @@ Eigen::Vector4d quaternion(const Matrix3<double>& rotation) {
   return q.normalized().coeffs();  // x y z w
 }
 
-// One row per IMU sample after the start, as NumPy arrays.
+// One array of a recording, filled row by row.
+template <typename T>
+class Column {
+ public:
+  // tail: the shape of a row.
+  Column(const char* name, py::ssize_t capacity, std::vector<py::ssize_t> tail = {})
+      : name_(name), shape_(std::move(tail)) {
+    for (const py::ssize_t n : shape_) width_ *= n;
+    shape_.insert(shape_.begin(), capacity);
+    array_ = py::array_t<T>(shape_);
+    next_ = array_.mutable_data();
+  }
+
+  // Where the next row goes. Needs no GIL.
+  T* next() {
+    T* const row = next_;
+    next_ += width_;
+    return row;
+  }
+
+  // Gives the array of the first `rows` away.
+  void move_to(py::dict& out, py::ssize_t rows) {
+    shape_.front() = rows;
+    array_.resize(shape_, false);  // nobody else has seen it
+    out[name_] = std::move(array_);
+  }
+
+ private:
+  const char* name_;
+  std::vector<py::ssize_t> shape_;
+  py::ssize_t width_ = 1;
+  py::array_t<T> array_;
+  T* next_;
+};
+
+// One row per IMU sample after the start, written to NumPy arrays as it comes.
 class Recorder {
  public:
-  explicit Recorder(std::size_t capacity) { states_.reserve(capacity); }
-  void add(const State& s) { states_.push_back(s); }
+  explicit Recorder(py::ssize_t capacity)
+      : t_("t_ns", capacity),
+        position_("position", capacity, {3}),
+        quaternion_("quaternion", capacity, {4}),
+        velocity_("velocity", capacity, {3}),
+        gyro_bias_("gyro_bias", capacity, {3}),
+        accel_bias_("accel_bias", capacity, {3}),
+        spin_("spin", capacity),
+        endcaps_body_("endcaps_body", capacity, {6, 3}),
+        endcaps_world_("endcaps_world", capacity, {6, 3}),
+        position_covariance_("position_covariance", capacity, {3, 3}),
+        orientation_covariance_("orientation_covariance", capacity, {3, 3}),
+        velocity_covariance_("velocity_covariance", capacity, {3, 3}),
+        load_shares_("load_shares", capacity, {6}),
+        cable_nis_("cable_nis", capacity),
+        ground_nis_("ground_nis", capacity),
+        contacts_("contacts", capacity, {6}) {
+    health_.reserve(kCounters.size());
+    for (const Counter& counter : kCounters) health_.emplace_back(counter.name, capacity);
+  }
 
-  py::dict arrays() const {
-    py::dict out;
-    const auto column = [&](const char* name, std::vector<py::ssize_t> tail, auto&& fill) {
-      std::vector<py::ssize_t> shape{py::ssize_t(states_.size())};
-      py::ssize_t width = 1;
-      for (const py::ssize_t n : tail) {
-        shape.push_back(n);
-        width *= n;
-      }
-      py::array_t<double> a(shape);
-      double* data = a.mutable_data();
-      for (std::size_t k = 0; k < states_.size(); ++k)
-        fill(states_[k], data + py::ssize_t(k) * width);
-      out[name] = a;
-    };
-    using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-    const auto vector = [](const V3& v, double* to) { Eigen::Map<V3>{to} = v; };
-    const auto matrix = [](const Matrix3<double>& m, double* to) { Eigen::Map<RowMajor3>{to} = m; };
-    py::array_t<std::int64_t> t(py::ssize_t(states_.size()));
-    for (std::size_t k = 0; k < states_.size(); ++k) t.mutable_data()[k] = states_[k].t;
-    out["t_ns"] = t;
-    column("position", {3}, [&](const State& s, double* to) { vector(s.position, to); });
-    column("quaternion", {4}, [](const State& s, double* to) {
-      Eigen::Map<Eigen::Vector4d>{to} = quaternion(s.rotation);
-    });
-    column("velocity", {3}, [&](const State& s, double* to) { vector(s.velocity, to); });
-    column("gyro_bias", {3}, [&](const State& s, double* to) { vector(s.gyro_bias, to); });
-    column("accel_bias", {3}, [&](const State& s, double* to) { vector(s.accel_bias, to); });
-    column("spin", {}, [](const State& s, double* to) { *to = s.spin; });
-    column("endcaps_body", {6, 3},
-           [](const State& s, double* to) { Eigen::Map<Endcaps<double>>{to} = s.endcaps_body; });
-    column("endcaps_world", {6, 3},
-           [](const State& s, double* to) { Eigen::Map<Endcaps<double>>{to} = s.endcaps_world; });
-    column("position_covariance", {3, 3},
-           [&](const State& s, double* to) { matrix(s.position_covariance, to); });
-    column("orientation_covariance", {3, 3},
-           [&](const State& s, double* to) { matrix(s.rotation_covariance, to); });
-    column("velocity_covariance", {3, 3},
-           [&](const State& s, double* to) { matrix(s.velocity_covariance, to); });
-    column("load_shares", {6},
-           [](const State& s, double* to) { std::copy_n(s.load_shares.begin(), 6, to); });
-    column("cable_nis", {}, [](const State& s, double* to) { *to = s.cable_nis; });
-    column("ground_nis", {}, [](const State& s, double* to) { *to = s.ground_nis; });
-    py::array_t<bool> contacts({py::ssize_t(states_.size()), py::ssize_t(6)});
-    for (std::size_t k = 0; k < states_.size(); ++k) {
-      for (std::size_t i = 0; i < 6; ++i)
-        contacts.mutable_data()[6 * k + i] = states_[k].contacts[i];
+  void add(const State& s) {
+    *t_.next() = s.t;
+    Eigen::Map<V3>{position_.next()} = s.position;
+    Eigen::Map<Eigen::Vector4d>{quaternion_.next()} = quaternion(s.rotation);
+    Eigen::Map<V3>{velocity_.next()} = s.velocity;
+    Eigen::Map<V3>{gyro_bias_.next()} = s.gyro_bias;
+    Eigen::Map<V3>{accel_bias_.next()} = s.accel_bias;
+    *spin_.next() = s.spin;
+    Eigen::Map<Endcaps<double>>{endcaps_body_.next()} = s.endcaps_body;
+    Eigen::Map<Endcaps<double>>{endcaps_world_.next()} = s.endcaps_world;
+    // Symmetric: rows and columns are the same.
+    Eigen::Map<Matrix3<double>>{position_covariance_.next()} = s.position_covariance;
+    Eigen::Map<Matrix3<double>>{orientation_covariance_.next()} = s.rotation_covariance;
+    Eigen::Map<Matrix3<double>>{velocity_covariance_.next()} = s.velocity_covariance;
+    std::copy(s.load_shares.begin(), s.load_shares.end(), load_shares_.next());
+    *cable_nis_.next() = s.cable_nis;
+    *ground_nis_.next() = s.ground_nis;
+    std::copy(s.contacts.begin(), s.contacts.end(), contacts_.next());
+    for (std::size_t k = 0; k < kCounters.size(); ++k) {
+      *health_[k].next() = s.health.*kCounters[k].member;
     }
-    out["contacts"] = contacts;
+    ++rows_;
+  }
+
+  // Gives the arrays away: for the end.
+  py::dict arrays() {
+    py::dict out;
+    t_.move_to(out, rows_);
+    for (Column<double>* column :
+         {&position_, &quaternion_, &velocity_, &gyro_bias_, &accel_bias_, &spin_, &endcaps_body_,
+          &endcaps_world_, &position_covariance_, &orientation_covariance_, &velocity_covariance_,
+          &load_shares_, &cable_nis_, &ground_nis_}) {
+      column->move_to(out, rows_);
+    }
+    contacts_.move_to(out, rows_);
     py::dict health;
-    const auto counter = [&](const char* name, std::uint32_t PrismHealth::* member) {
-      py::array_t<std::int64_t> a(py::ssize_t(states_.size()));
-      for (std::size_t k = 0; k < states_.size(); ++k) {
-        a.mutable_data()[k] = states_[k].health.*member;
-      }
-      health[name] = a;
-    };
-    counter("imu_dropped", &PrismHealth::imu_dropped);
-    counter("imu_gaps", &PrismHealth::imu_gaps);
-    counter("cables_dropped", &PrismHealth::cables_dropped);
-    counter("contacts_dropped", &PrismHealth::contacts_dropped);
-    counter("shape_failures", &PrismHealth::shape_failures);
-    counter("contacts_rejected", &PrismHealth::contacts_rejected);
-    counter("cables_rejected", &PrismHealth::cables_rejected);
-    counter("spin_resets", &PrismHealth::spin_resets);
-    counter("velocity_resets", &PrismHealth::velocity_resets);
-    counter("terrain_mismatches", &PrismHealth::terrain_mismatches);
+    for (Column<std::int64_t>& column : health_) column.move_to(health, rows_);
     out["health"] = health;
     return out;
   }
 
  private:
-  std::vector<State> states_;
+  struct Counter {
+    const char* name;
+    std::uint32_t PrismHealth::* member;
+  };
+  static constexpr std::array<Counter, 10> kCounters{{
+      {"imu_dropped", &PrismHealth::imu_dropped},
+      {"imu_gaps", &PrismHealth::imu_gaps},
+      {"cables_dropped", &PrismHealth::cables_dropped},
+      {"contacts_dropped", &PrismHealth::contacts_dropped},
+      {"shape_failures", &PrismHealth::shape_failures},
+      {"contacts_rejected", &PrismHealth::contacts_rejected},
+      {"cables_rejected", &PrismHealth::cables_rejected},
+      {"spin_resets", &PrismHealth::spin_resets},
+      {"velocity_resets", &PrismHealth::velocity_resets},
+      {"terrain_mismatches", &PrismHealth::terrain_mismatches},
+  }};
+
+  Column<std::int64_t> t_;
+  Column<double> position_, quaternion_, velocity_, gyro_bias_, accel_bias_, spin_, endcaps_body_,
+      endcaps_world_, position_covariance_, orientation_covariance_, velocity_covariance_,
+      load_shares_, cable_nis_, ground_nis_;
+  Column<bool> contacts_;
+  std::vector<Column<std::int64_t>> health_;
+  py::ssize_t rows_ = 0;
 };
 
 // The samples of an IMU on another rod.
@@ -192,7 +256,7 @@ py::tuple replay(Estimator& estimator, const Stamps& imu_t, const Doubles& gyro,
 
   const py::ssize_t imus = imu_t.size(), cables = cables_t.size();
   const py::ssize_t contacts = contacts_t ? contacts_t->size() : 0;
-  Recorder recorder{std::size_t(imus)};
+  Recorder recorder(imus);
   py::ssize_t c = 0, f = 0;
   std::chrono::steady_clock::duration elapsed{0};
   constexpr py::ssize_t kChunk = 2000;  // samples between two looks at signals and progress
@@ -228,7 +292,9 @@ py::tuple replay(Estimator& estimator, const Stamps& imu_t, const Doubles& gyro,
         estimator.imu(t, Eigen::Map<const V3>(gyro.data() + 3 * k),
                       Eigen::Map<const V3>(accel.data() + 3 * k));
         feed_until([t](Nanoseconds stamp) { return stamp == t; });
-        if (estimator.initialized()) recorder.add(estimator.state());
+        if (estimator.initialized()) {
+          recorder.add(estimator.state_without_shape_covariance());
+        }
       }
       elapsed += std::chrono::steady_clock::now() - started;
     }
@@ -373,16 +439,36 @@ void bind_estimator(py::module_& m) {
 
   py::class_<Estimator>(m, "PrismEstimator",
                         "Streaming estimator: IMU, cables and contacts in, state out.")
-      .def(py::init<const Prism<double>&, const Config&, bool>(), py::arg("robot"),
-           py::arg("config"), py::arg("tight") = true)
-      .def("imu", &Estimator::imu, py::arg("t"), py::arg("gyro"), py::arg("accel"),
-           "One IMU sample: t [ns], angular velocity (3,) [rad/s], specific force (3,) [m/s^2].")
-      .def("rod_imu", &Estimator::rod_imu, py::arg("t"), py::arg("rod"), py::arg("gyro"),
-           py::arg("accel"),
-           "An IMU on rod 1 (r23) or 2 (r45), z toward its even endcap: t [ns], rate (3,) [rad/s], "
-           "specific force (3,) [m/s^2]. Before the base rod's sample of the same stamp.")
-      .def("cables", &Estimator::cables, py::arg("t"), py::arg("lengths"),
-           "Cable lengths: t [ns], (9,) [m] in the order of PRISM_CABLES, NaN: not measured.")
+      .def(
+          py::init<const Prism<double>&, const Config&, bool, const std::optional<Matrix3<double>>&,
+                   const std::optional<CableLengths<double>>&>(),
+          py::arg("robot"), py::arg("config"), py::arg("tight") = true, py::kw_only(),
+          py::arg("imu_rotation") = py::none(), py::arg("cable_offsets") = py::none(),
+          "imu_rotation (3, 3) turns IMU samples into the body frame, cable_offsets (9,) [m] are "
+          "taken off the lengths; None leaves them as they are.")
+      .def(
+          "imu",
+          [](Estimator& e, Nanoseconds t, const Numbers<3>& gyro, const Numbers<3>& accel) {
+            return e.imu(t, *gyro, *accel);
+          },
+          py::arg("t"), py::arg("gyro"), py::arg("accel"),
+          "One IMU sample: t [ns], angular velocity (3,) [rad/s], specific force (3,) [m/s^2], in "
+          "the frame of the IMU.")
+      .def(
+          "rod_imu",
+          [](Estimator& e, Nanoseconds t, int rod, const Numbers<3>& gyro,
+             const Numbers<3>& accel) { return e.rod_imu(t, rod, *gyro, *accel); },
+          py::arg("t"), py::arg("rod"), py::arg("gyro"), py::arg("accel"),
+          "An IMU on rod 1 (r23) or 2 (r45), z toward its even endcap: t [ns], rate (3,) [rad/s], "
+          "specific force (3,) [m/s^2]. Before the base rod's sample of the same stamp.")
+      .def(
+          "cables",
+          [](Estimator& e, Nanoseconds t, const Numbers<9>& lengths) {
+            return e.cables(t, *lengths);
+          },
+          py::arg("t"), py::arg("lengths"),
+          "Cable lengths: t [ns], (9,) [m] in the order of PRISM_CABLES, NaN: not measured. "
+          "Offsets are taken off.")
       .def(
           "contacts",
           [](Estimator& e, Nanoseconds t, const Bools& flags) {

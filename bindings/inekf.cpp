@@ -34,11 +34,11 @@ void set_covariance(Belief& b, const Eigen::MatrixXd& p) {
 inekf::Kinematics<double, 6, 1> spun_kinematics(const Numbers<6, 3>& h,
                                                 const Numbers<18, 18>& covariance) {
   inekf::Kinematics<double, 6, 1> k;
-  k.h = h.values.transpose();
+  k.h = (*h).transpose();
   for (int i = 0; i < 6; ++i) {
     k.h_extra.middleRows<3>(3 * i) = V3::UnitZ().cross(V3(k.h.col(i)));
   }
-  k.covariance = covariance.values;
+  k.covariance = (*covariance).transpose();  // symmetric: the same, in the order of memory
   return k;
 }
 
@@ -95,8 +95,8 @@ void bind_inekf(py::module_& m) {
           [](Belief& b, const Numbers<3>& gyro, const Numbers<3>& accel, double dt,
              const FilterNoise& noise, double rolling_radius, double gravity) {
             if (!(dt > 0)) throw py::value_error("dt: has to be positive [s]");
-            inekf::propagate(b, {gyro.values, accel.values}, dt, gravity, noise.process,
-                             {rolling_radius}, Vector<double, 1>(noise.spin_walk));
+            inekf::propagate(b, {*gyro, *accel}, dt, gravity, noise.process, {rolling_radius},
+                             Vector<double, 1>(noise.spin_walk));
           },
           py::arg("gyro"), py::arg("accel"), py::arg("dt"), py::arg("noise"),
           py::arg("rolling_radius") = 0.0, py::arg("gravity") = 9.81,

@@ -1,24 +1,28 @@
 // Small arrays of fixed size as arguments of calls whose own cost counts.
 //
 // pybind11 takes a NumPy array to an Eigen matrix through a new array object and a table of
-// strides, about half a microsecond each. An array that already has the type, order and size is
-// copied from its buffer here; everything else goes the general way.
+// strides, which takes longer than a step of some filters. An array that has the type and shape
+// already is read where it is; everything else goes pybind11's way, with its conversions and its
+// errors.
 #pragma once
-
-#include <cstring>
 
 #include "bindings.hpp"
 
 namespace tensegrity::bindings {
 
-// `values` has the layout of a NumPy array: rows one after the other.
+// Rows x Cols numbers, valid during the call; `*numbers` is the matrix.
 template <int Rows, int Cols = 1>
-struct Numbers {
+class Numbers {
+ public:
+  // The layout of a NumPy array: rows one after the other.
   static constexpr int kOrder = Cols == 1 ? Eigen::ColMajor : Eigen::RowMajor;
-  using Values = Eigen::Matrix<double, Rows, Cols, kOrder>;
-  Values values;
+  using Matrix = Eigen::Matrix<double, Rows, Cols, kOrder>;
 
-  operator const Values&() const { return values; }
+  explicit Numbers(const double* data) : data_(data) {}
+  Eigen::Map<const Matrix> operator*() const { return Eigen::Map<const Matrix>(data_); }
+
+ private:
+  const double* data_;
 };
 
 }  // namespace tensegrity::bindings
@@ -26,33 +30,53 @@ struct Numbers {
 namespace pybind11::detail {
 
 template <int Rows, int Cols>
-struct type_caster<tensegrity::bindings::Numbers<Rows, Cols>> {
+class type_caster<tensegrity::bindings::Numbers<Rows, Cols>> {
   using Numbers = tensegrity::bindings::Numbers<Rows, Cols>;
-  using General = make_caster<typename Numbers::Values>;
+  using Matrix = typename Numbers::Matrix;
+  using General = make_caster<Matrix>;
 
-  PYBIND11_TYPE_CASTER(Numbers, General::name);
+ public:
+  static constexpr auto name = General::name;
+  template <typename>
+  using cast_op_type = Numbers;
 
   bool load(handle source, bool convert) {
-    if (copy(source)) return true;
-    General general;
-    if (!general.load(source, convert)) return false;
-    value.values = static_cast<typename Numbers::Values&>(general);
+    if (take(source)) return true;
+    if (!general_.load(source, convert)) return false;
+    data_ = static_cast<Matrix&>(general_).data();
+    return true;
+  }
+  operator Numbers() const { return Numbers(data_); }
+
+ private:
+  bool take(handle source) {
+    // NumPy has one object for each of its own types; a type that only equals it goes the other
+    // way. It lives as long as NumPy.
+    static const PyObject* const float64 = dtype::of<double>().release().ptr();
+    if (!npy_api::get().PyArray_Check_(source.ptr())) return false;
+    const PyArray_Proxy* a = array_proxy(source.ptr());
+    const bool shaped = Cols == 1
+                            ? a->nd == 1 && a->dimensions[0] == Rows
+                            : a->nd == 2 && a->dimensions[0] == Rows && a->dimensions[1] == Cols;
+    if (!shaped || a->descr != float64 || (a->flags & npy_api::NPY_ARRAY_ALIGNED_) == 0) {
+      return false;
+    }
+    if ((a->flags & npy_api::NPY_ARRAY_C_CONTIGUOUS_) != 0) {
+      data_ = reinterpret_cast<const double*>(a->data);
+      return true;
+    }
+    if (Cols != 1) return false;
+    // A row of a recording that was read column by column.
+    Matrix& copy = static_cast<Matrix&>(general_);
+    for (int k = 0; k < Rows; ++k) {
+      copy(k) = *reinterpret_cast<const double*>(a->data + k * a->strides[0]);
+    }
+    data_ = copy.data();
     return true;
   }
 
- private:
-  bool copy(handle source) {
-    if (!isinstance<array>(source)) return false;
-    const auto given = reinterpret_borrow<array>(source);
-    const bool shaped = Cols == 1
-                            ? given.ndim() == 1 && given.shape(0) == Rows
-                            : given.ndim() == 2 && given.shape(0) == Rows && given.shape(1) == Cols;
-    if (!shaped || (given.flags() & array::c_style) == 0) return false;
-    const dtype type = given.dtype();
-    if (type.num() != dtype::num_of<double>() || type.byteorder() != '=') return false;
-    std::memcpy(value.values.data(), given.data(), sizeof(double) * Rows * Cols);
-    return true;
-  }
+  const double* data_ = nullptr;
+  General general_;
 };
 
 }  // namespace pybind11::detail

@@ -773,11 +773,13 @@ class PrismEstimator:
     """
     Streaming estimator: IMU, cables and contacts in, state out.
     """
-    def __init__(self, robot: Prism, config: PrismConfig, tight: bool = True) -> None:
-        ...
+    def __init__(self, robot: Prism, config: PrismConfig, tight: bool = True, *, imu_rotation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"] | None = None, cable_offsets: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"] | None = None) -> None:
+        """
+        imu_rotation (3, 3) turns IMU samples into the body frame, cable_offsets (9,) [m] are taken off the lengths; None leaves them as they are.
+        """
     def cables(self, t: typing.SupportsInt | typing.SupportsIndex, lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[9, 1]"]) -> Status:
         """
-        Cable lengths: t [ns], (9,) [m] in the order of PRISM_CABLES, NaN: not measured.
+        Cable lengths: t [ns], (9,) [m] in the order of PRISM_CABLES, NaN: not measured. Offsets are taken off.
         """
     def contacts(self, t: typing.SupportsInt | typing.SupportsIndex, flags: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> Status:
         """
@@ -785,7 +787,7 @@ class PrismEstimator:
         """
     def imu(self, t: typing.SupportsInt | typing.SupportsIndex, gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> Status:
         """
-        One IMU sample: t [ns], angular velocity (3,) [rad/s], specific force (3,) [m/s^2].
+        One IMU sample: t [ns], angular velocity (3,) [rad/s], specific force (3,) [m/s^2], in the frame of the IMU.
         """
     def replay(self, imu_t: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], gyro: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], accel: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], cables_t: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], lengths: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], contacts_t: typing.Annotated[numpy.typing.ArrayLike, numpy.int64] | None = None, flags: typing.Annotated[numpy.typing.ArrayLike, numpy.bool] | None = None, rod_imus: collections.abc.Sequence[tuple[typing.SupportsInt | typing.SupportsIndex, typing.Annotated[numpy.typing.ArrayLike, numpy.int64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64], typing.Annotated[numpy.typing.ArrayLike, numpy.float64]]] = [], progress: collections.abc.Callable[[float], None] | None = None) -> tuple:
         """

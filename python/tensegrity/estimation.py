@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, SupportsIndex, SupportsInt
-
-import numpy as np
-from numpy.typing import ArrayLike
 
 import tensegrity._core as _core
 from tensegrity.config import FilterConfig
@@ -21,16 +17,15 @@ from tensegrity.trajectory import Trajectory
 
 Progress = Callable[[float], None]
 
-RodImu = tuple[SupportsInt | SupportsIndex, ArrayLike, ArrayLike, ArrayLike]
-"""Number of the rod (1: r23, 2: r45), stamps [ns], rates [rad/s], specific forces [m/s^2]."""
-
 
 class PrismEstimator(_core.PrismEstimator):
     """The streaming estimator of a 3-bar prism; the C++ class has the same names and units.
 
     ``imu``, ``cables`` and ``contacts`` take a stamp in integer nanoseconds and may be called in
     any interleaving; each returns a :class:`tensegrity._core.Status`. ``state`` is the estimate at
-    the newest IMU sample.
+    the newest IMU sample. IMU samples are in the frame of the IMU, which the robot's
+    ``imu_misalignment`` turns into the body frame; the robot's ``cable_offsets`` are taken off the
+    lengths.
 
     ``robot`` and ``config`` are models, names of packaged ones, or paths to YAML files.
     """
@@ -42,59 +37,16 @@ class PrismEstimator(_core.PrismEstimator):
     ) -> None:
         robot = robot if isinstance(robot, Robot) else load_robot(robot)
         config = config if isinstance(config, FilterConfig) else FilterConfig.load(config)
-        tight = config.settings.filter == "tight"
-        super().__init__(core_robot(robot), core_config(config), tight)
-        # None leaves samples as they are, also their type: most robots need no correction.
-        self._imu_rotation = (
-            imu_rotation(robot.imu_misalignment) if any(robot.imu_misalignment) else None
+        super().__init__(
+            core_robot(robot),
+            core_config(config),
+            tight=config.settings.filter == "tight",
+            # None leaves samples as they are: most robots need no correction.
+            imu_rotation=(
+                imu_rotation(robot.imu_misalignment) if any(robot.imu_misalignment) else None
+            ),
+            cable_offsets=robot.cable_offsets if any(robot.cable_offsets) else None,
         )
-        self._cable_offsets = np.array(robot.cable_offsets) if any(robot.cable_offsets) else None
-
-    def imu(
-        self, t: SupportsInt | SupportsIndex, gyro: ArrayLike, accel: ArrayLike
-    ) -> _core.Status:
-        """One IMU sample: t [ns], angular velocity (3,) [rad/s], specific force (3,) [m/s^2], in
-        the frame of the IMU, which the robot's ``imu_misalignment`` turns into the body frame."""
-        return super().imu(t, self._to_body(gyro), self._to_body(accel))
-
-    def cables(self, t: SupportsInt | SupportsIndex, lengths: ArrayLike) -> _core.Status:
-        """Cable lengths: t [ns], (9,) [m] in the order of the robot's cables, NaN: not measured.
-        The robot's ``cable_offsets`` are taken off."""
-        return super().cables(t, self._without_offsets(lengths))
-
-    def replay(
-        self,
-        imu_t: ArrayLike,
-        gyro: ArrayLike,
-        accel: ArrayLike,
-        cables_t: ArrayLike,
-        lengths: ArrayLike,
-        contacts_t: ArrayLike | None = None,
-        flags: ArrayLike | None = None,
-        rod_imus: Iterable[RodImu] = (),
-        progress: Progress | None = None,
-    ) -> tuple[dict[str, Any], float]:
-        """Feeds a whole recording and returns (arrays by name, seconds in the estimator).
-
-        ``rod_imus``: the samples of each IMU on another rod.
-        """
-        return super().replay(
-            imu_t,
-            self._to_body(gyro),
-            self._to_body(accel),
-            cables_t,
-            self._without_offsets(lengths),
-            contacts_t,
-            flags,
-            list(rod_imus),
-            progress,
-        )
-
-    def _to_body(self, vectors: ArrayLike) -> ArrayLike:
-        return vectors if self._imu_rotation is None else np.dot(vectors, self._imu_rotation.T)
-
-    def _without_offsets(self, lengths: ArrayLike) -> ArrayLike:
-        return lengths if self._cable_offsets is None else np.subtract(lengths, self._cable_offsets)
 
 
 def estimate(

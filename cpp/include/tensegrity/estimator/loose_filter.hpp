@@ -138,16 +138,19 @@ class LooseFilter {
     s.gyro_bias = belief_.gyro_bias;
     s.accel_bias = belief_.accel_bias;
     s.spin = belief_.extra[0];
-    s.spin_variance = belief_.covariance(Belief::kExtra, Belief::kExtra);
     s.endcaps_body = spun(endcaps_, s.spin);
     s.endcaps_world = (s.rotation * s.endcaps_body).colwise() + s.position;
-    s.endcap_covariance = kinematics().covariance;
     s.rotation_covariance = belief_.rotation_covariance();
     s.velocity_covariance = belief_.velocity_covariance();
     s.position_covariance = belief_.position_covariance();
     for (int slot = 0; slot < belief_.anchor_count; ++slot) {
       s.contacts[std::size_t(belief_.anchor_ids[std::size_t(slot)])] = true;
     }
+  }
+
+  void describe_shape_covariance(PrismState<Scalar>& s) const {
+    s.endcap_covariance = kinematics().covariance;
+    s.spin_variance = belief_.covariance(Belief::kExtra, Belief::kExtra);
   }
 
   // The filter's own mean and covariance, in the invariant frame.

@@ -108,6 +108,14 @@ class PrismEstimator {
   bool initialized() const { return initialized_; }
 
   PrismState<Scalar> state() const {
+    PrismState<Scalar> s = state_without_shape_covariance();
+    if (initialized_) filter_.describe_shape_covariance(s);
+    return s;
+  }
+
+  // The same with `endcap_covariance` and `spin_variance` left at zero: they take longer than all
+  // the rest, which counts where every state is recorded.
+  PrismState<Scalar> state_without_shape_covariance() const {
     PrismState<Scalar> s;
     s.t = time_;
     s.initialized = initialized_;

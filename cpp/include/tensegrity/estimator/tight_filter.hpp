@@ -200,18 +200,22 @@ class TightFilter {
     s.accel_bias = belief_.accel_bias;
     s.endcaps_world = belief_.endcaps_world();
     s.endcaps_body = belief_.endcaps_body();
-    s.endcap_covariance = belief_.endcap_covariance();
-    // phi, and the gradient of it at a shape in the gauge of the turned reference.
     s.spin = shape::spin_angle(s.endcaps_body, reference_);
-    const Vector<Scalar, 18> gradient =
-        shape::spin_gradient(s.endcaps_body, spun(reference_, s.spin));
-    s.spin_variance = gradient.dot(s.endcap_covariance * gradient);
     s.rotation_covariance = belief_.rotation_covariance();
     s.velocity_covariance = belief_.velocity_covariance();
     s.position_covariance = belief_.position_covariance();
     s.contacts = loaded_;
     s.cable_nis = cable_nis_;
     s.ground_nis = ground_nis_;
+  }
+
+  // Needs the shape that `describe` has filled in.
+  void describe_shape_covariance(PrismState<Scalar>& s) const {
+    s.endcap_covariance = belief_.endcap_covariance();
+    // Of phi, by its gradient at a shape in the gauge of the turned reference.
+    const Vector<Scalar, 18> gradient =
+        shape::spin_gradient(s.endcaps_body, spun(reference_, s.spin));
+    s.spin_variance = gradient.dot(s.endcap_covariance * gradient);
   }
 
   // The filter's own mean and covariance, in the invariant frame.
