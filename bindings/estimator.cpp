@@ -346,6 +346,7 @@ void bind_estimator(py::module_& m) {
       .def_readwrite("spin", &Config::spin)
       .def_readwrite("contact_point", &Config::contact_point)
       .def_readwrite("contact_noise", &Config::contact_noise)
+      .def_readwrite("max_shape_iterations", &Config::max_shape_iterations)
       .def_readwrite("imu_sampling", &Config::imu_sampling)
       .def_readwrite("static_bias_initialization", &Config::static_bias_initialization)
       .def_readwrite("init_bias_size", &Config::init_bias_size)

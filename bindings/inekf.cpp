@@ -121,7 +121,7 @@ void bind_inekf(py::module_& m) {
       .def(
           "correct_contacts",
           [](Belief& b, const Numbers<6, 3>& h, const Numbers<18, 18>& covariance, double gate) {
-            const inekf::Correction c =
+            const inekf::Correction<double> c =
                 inekf::correct_contacts(b, spun_kinematics(h, covariance), gate);
             return py::make_tuple(c.status, c.chi_square);
           },

@@ -40,6 +40,11 @@ class Settings(StrictModel):
     contact_noise: Literal["constant", "from_shape"] = field(
         "filter: loose, covariance of a contact's position: contact_position_std, or the shape's"
     )
+    max_shape_iterations: int = field(
+        "filter: loose, least squares stops after so many steps with the best shape so far",
+        unit="steps",
+        ge=1,
+    )
     imu_sampling: Literal["interval_mean", "instantaneous"] = field(
         "a sample is the mean since the previous stamp, or the value at its stamp"
     )

@@ -68,7 +68,7 @@ TEST_CASE("columns, outer products and mirrors of part of a covariance") {
     p.topLeftCorner(size, size).setRandom();
     P columns = p;
     const tensegrity::Matrix3<double> m = tensegrity::Matrix3<double>::Random();
-    tensegrity::add_columns(columns, 0, 9, m, size);
+    tensegrity::add_columns(columns, 0, 9, m, 0, size);
     P expected = p;
     expected.middleCols<3>(0) += p.middleCols<3>(9) * m.transpose();
     CHECK((columns - expected).norm() < 1e-14);

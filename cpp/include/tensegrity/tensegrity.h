@@ -169,6 +169,7 @@ typedef struct tensegrity_config {
   tensegrity_spin_method spin;
   tensegrity_contact_point contact_point;
   tensegrity_contact_noise contact_noise;
+  int32_t max_shape_iterations; /* of a sample's least squares, >= 1 */
   /* settings: both methods */
   tensegrity_imu_sampling imu_sampling;
   bool static_bias_initialization;

@@ -8,18 +8,18 @@ namespace {
 
 // Every field, once. A structured binding takes exactly as many names as a struct has fields, so
 // that a field which is added to one struct alone does not compile.
-#define TENSEGRITY_CONFIG_FIELDS(F)                                                             \
-  F(shape), F(spin), F(contact_point), F(contact_noise), F(imu_sampling),                       \
-      F(static_bias_initialization), F(init_bias_size), F(static_gyro_limit),                   \
-      F(static_accel_limit), F(max_imu_gap), F(max_latency), F(chi_square_gate), F(gravity),    \
-      F(terrain), F(friction), F(contact_error), F(cable_gate), F(orientation_std),             \
-      F(velocity_std), F(position_std), F(gyroscope_bias), F(gyroscope_bias_std),               \
-      F(accelerometer_bias), F(accelerometer_bias_std), F(spin_prior_std), F(cable_offset_std), \
-      F(ground_slope_std), F(gyroscope_std), F(accelerometer_std), F(gyroscope_bias_walk),      \
-      F(accelerometer_bias_walk), F(cable_std), F(contact_std), F(contact_position_std),        \
-      F(spin_walk), F(shape_std_rest), F(shape_std_moving), F(endcap_acceleration_rest),        \
-      F(endcap_acceleration_moving), F(active_force), F(active_rate), F(creep_std),             \
-      F(slip_length), F(slip_speed), F(foot_rise_std), F(foot_height_std), F(rod_rate_std),     \
+#define TENSEGRITY_CONFIG_FIELDS(F)                                                                \
+  F(shape), F(spin), F(contact_point), F(contact_noise), F(max_shape_iterations), F(imu_sampling), \
+      F(static_bias_initialization), F(init_bias_size), F(static_gyro_limit),                      \
+      F(static_accel_limit), F(max_imu_gap), F(max_latency), F(chi_square_gate), F(gravity),       \
+      F(terrain), F(friction), F(contact_error), F(cable_gate), F(orientation_std),                \
+      F(velocity_std), F(position_std), F(gyroscope_bias), F(gyroscope_bias_std),                  \
+      F(accelerometer_bias), F(accelerometer_bias_std), F(spin_prior_std), F(cable_offset_std),    \
+      F(ground_slope_std), F(gyroscope_std), F(accelerometer_std), F(gyroscope_bias_walk),         \
+      F(accelerometer_bias_walk), F(cable_std), F(contact_std), F(contact_position_std),           \
+      F(spin_walk), F(shape_std_rest), F(shape_std_moving), F(endcap_acceleration_rest),           \
+      F(endcap_acceleration_moving), F(active_force), F(active_rate), F(creep_std),                \
+      F(slip_length), F(slip_speed), F(foot_rise_std), F(foot_height_std), F(rod_rate_std),        \
       F(rod_inclination_std), F(ground_height_walk), F(ground_slope_walk)
 #define TENSEGRITY_HEALTH_FIELDS(F)                                                       \
   F(imu_dropped), F(imu_gaps), F(cables_dropped), F(contacts_dropped), F(shape_failures), \
@@ -162,10 +162,10 @@ tensegrity_status check(const tensegrity_config& c) {
     finite = finite && std::isfinite(c.gyroscope_bias[i]) && std::isfinite(c.accelerometer_bias[i]);
   }
   if (!finite) return TENSEGRITY_NOT_FINITE;
-  in_range = in_range && c.init_bias_size >= 1 && c.chi_square_gate < 1 &&
-             c.contact_error < Real(0.5) && below(c.shape, 2) && below(c.spin, 2) &&
-             below(c.contact_point, 2) && below(c.contact_noise, 2) && below(c.imu_sampling, 2) &&
-             below(c.terrain, 3);
+  in_range = in_range && c.init_bias_size >= 1 && c.max_shape_iterations >= 1 &&
+             c.chi_square_gate < 1 && c.contact_error < Real(0.5) && below(c.shape, 2) &&
+             below(c.spin, 2) && below(c.contact_point, 2) && below(c.contact_noise, 2) &&
+             below(c.imu_sampling, 2) && below(c.terrain, 3);
   return in_range ? TENSEGRITY_OK : TENSEGRITY_OUT_OF_RANGE;
 }
 

@@ -46,6 +46,7 @@ struct PrismConfig {
   SpinMethod spin = SpinMethod::kFixed;
   ContactPoint contact_point = ContactPoint::kCentre;
   ContactNoise contact_noise = ContactNoise::kConstant;
+  int max_shape_iterations = 50;  // of a sample's least squares; a bound on the time it may take
   // every filter
   ImuSampling imu_sampling = ImuSampling::kIntervalMean;
   bool static_bias_initialization = true;

@@ -41,7 +41,7 @@ class LooseFilter {
   LooseFilter(const Prism<Scalar>& robot, const PrismConfig<Scalar>& config)
       : robot_(robot),
         config_(config),
-        solver_(robot, solver_options()),
+        solver_(robot, solver_options(config)),
         tracker_(robot),
         detector_(robot) {
     if (!(config.chi_square_gate > 0)) return;
@@ -159,8 +159,9 @@ class LooseFilter {
  private:
   // The last step of a quadratic convergence is a tenth of a millimetre, the error left after it
   // far less: cables are good to millimetres.
-  static shape::SolverOptions<Scalar> solver_options() {
+  static shape::SolverOptions<Scalar> solver_options(const PrismConfig<Scalar>& config) {
     shape::SolverOptions<Scalar> options;
+    options.max_iterations = config.max_shape_iterations;
     options.tolerance = Scalar(1e-4);
     return options;
   }
@@ -277,7 +278,8 @@ class LooseFilter {
   Status correct_contacts(PrismHealth& health) {
     if (belief_.anchor_count == 0) return Status::kOk;
     const Scalar gate = gates_[std::size_t(belief_.anchor_count)];
-    const inekf::Correction correction = inekf::correct_contacts(belief_, kinematics(), gate);
+    const inekf::Correction<Scalar> correction =
+        inekf::correct_contacts(belief_, kinematics(), gate);
     if (correction.status == Status::kRejected) {
       // The feet are not where they stood. They stand anew where the kinematics puts them.
       ++health.contacts_rejected;

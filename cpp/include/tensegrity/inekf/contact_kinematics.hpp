@@ -68,7 +68,8 @@ Innovation<B, 3 * Contacts, Contacts> contact_innovation(const B& belief,
 // Corrects with all anchored endcaps, whose number becomes a size here. `gate`: chi-square beyond
 // which nothing happens (0: none).
 template <int Contacts = 1, typename B, int N, typename Scalar = typename B::Scalar>
-Correction correct_contacts(B& belief, const Kinematics<Scalar, N, B::Extra>& k, Scalar gate) {
+Correction<Scalar> correct_contacts(B& belief, const Kinematics<Scalar, N, B::Extra>& k,
+                                    Scalar gate) {
   if (belief.anchor_count == Contacts) {
     return correct(belief, contact_innovation<Contacts>(belief, k), gate);
   }

@@ -21,9 +21,10 @@ struct Innovation {
   Matrix<Scalar, Rows> covariance;      // S = H P H^T + N, lower triangle
 };
 
+template <typename Scalar>
 struct Correction {
   Status status = Status::kOk;
-  double chi_square = 0;  // z^T S^-1 z, for as many degrees of freedom as rows
+  Scalar chi_square = 0;  // z^T S^-1 z, for as many degrees of freedom as rows
 };
 
 // Applies the update unless z^T S^-1 z exceeds `gate` (0: no gate). On kRejected or kNotFinite the
@@ -31,9 +32,9 @@ struct Correction {
 //
 // With S = L D L^T, y = L^-1 z and W = P H^T L^-T: e = W D^-1 y and P <- P - W D^-1 W^T.
 template <typename B, int Rows, int Anchors, typename Scalar = typename B::Scalar>
-Correction correct(B& belief, const Innovation<B, Rows, Anchors>& innovation, Scalar gate) {
+Correction<Scalar> correct(B& belief, const Innovation<B, Rows, Anchors>& innovation, Scalar gate) {
   constexpr int kStates = Innovation<B, Rows, Anchors>::kStates;
-  Correction result;
+  Correction<Scalar> result;
   Ldlt<Scalar, Rows> factors;
   if (!factors.factor(innovation.covariance)) {
     result.status = Status::kNotFinite;
@@ -42,7 +43,7 @@ Correction correct(B& belief, const Innovation<B, Rows, Anchors>& innovation, Sc
   const Vector<Scalar, Rows> y = factors.forward(innovation.residual);
   const Vector<Scalar, Rows> weighted = factors.inverse_diagonal().cwiseProduct(y);
   const Scalar chi_square = y.dot(weighted);
-  result.chi_square = double(chi_square);
+  result.chi_square = chi_square;
   if (!std::isfinite(chi_square)) {
     result.status = Status::kNotFinite;
     return result;

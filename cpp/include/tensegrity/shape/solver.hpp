@@ -32,7 +32,7 @@ template <typename Scalar>
 struct SolverOptions {
   int max_iterations = 50;        // of a solve that starts from the last solution
   int max_cold_iterations = 850;  // of one that does not, over all its starts
-  // Of the solution: the next step would be shorter, judged by how fast the steps shrink [m].
+  // Length of the last tangent step [m].
   Scalar tolerance = std::is_same_v<Scalar, float> ? Scalar(1e-5) : Scalar(1e-6);
 };
 
@@ -192,7 +192,6 @@ class Solver {
     LengthResiduals<Scalar> residuals(start, lengths);
     Solution now{start, residuals.cost(), 0, false, newton};
     Scalar damping = 0;
-    Scalar last_length = 0;  // of the last step, which has to have been an undamped one
     while (now.iterations < limit) {
       ++now.iterations;
       const Tangent<Scalar> gradient = residuals.gradient(now.rods);
@@ -219,11 +218,6 @@ class Solver {
       const Scalar trial_cost = trial_residuals.cost();
       // Gauss-Newton as long as that makes much progress.
       now.newton = trial_cost > Scalar(0.1) * now.cost;
-      // With every step shorter by the same factor, as at the slowest, what is left after this one
-      // is length r / (1 - r), r = length / last_length.
-      const bool shrinks = damping == 0 && trial_cost < now.cost && 2 * length < last_length &&
-                           length * length < options_.tolerance * (last_length - length);
-      last_length = damping == 0 && trial_cost < now.cost ? length : Scalar(0);
       if (trial_cost < now.cost) {
         now.rods = trial;
         now.cost = trial_cost;
@@ -232,7 +226,7 @@ class Solver {
       } else {
         damping = std::max(10 * damping, initial_damping);
       }
-      if (length < options_.tolerance || shrinks || now.cost < rounding_cost()) {
+      if (length < options_.tolerance || now.cost < rounding_cost()) {
         now.converged = true;
         break;
       }
