@@ -23,6 +23,7 @@ class Transition {
   Transition(const Strapdown<Scalar>& body, Scalar gyro_std, Scalar accel_std)
       : body_(body), gyro_variance_(gyro_std * gyro_std), accel_variance_(accel_std * accel_std) {
     by_.template topRows<kBody>().setZero();
+    set_zero(kBody, kAccelBias + 3);
     by_.template block<3, 3>(kRotation, 0) = -body.int_r;
     by_.template block<3, 3>(kVelocity, 0) = body.velocity_by_gyro;
     by_.template block<3, 3>(kPosition, 0) = body.position_by_gyro;
@@ -36,8 +37,8 @@ class Transition {
     by_.template block<3, 3>(kPosition, kByAccel) = body.position_by_accel;
   }
 
-  // Rows that no error of the gyro reaches. Every row after the body's has to be set, by this or
-  // by `group_columns`.
+  // Rows that no error of the gyro reaches. Every row after those of the biases has to be set, by
+  // this or by `group_columns`.
   void set_zero(int row, int end) {
     for (; row < end; ++row) by_.row(row).template head<3>().setZero();
   }
