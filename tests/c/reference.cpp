@@ -67,7 +67,7 @@ const char* difference(const tensegrity::PrismState<Real>& a, const tensegrity_s
 
 }  // namespace
 
-// The code of both estimators is in the C library: what is tested here is the way to it.
+// The library's code of both estimators: what is tested here is the way to it.
 extern template class tensegrity::PrismEstimator<Real, tensegrity::TightFilter<Real>>;
 extern template class tensegrity::PrismEstimator<Real, tensegrity::LooseFilter<Real>>;
 
@@ -78,6 +78,7 @@ void reference_create(reference_method method) {
   config.cable_std = REFERENCE_CABLE_STD;
   config.init_bias_size = REFERENCE_BIAS_SIZE;
   config.gyroscope_bias = V3(0, REFERENCE_BIAS, 0);
+  config.static_bias_initialization = method == REFERENCE_FULL;  // else the bias is that of above
   config.imu_sampling = tensegrity::ImuSampling::kInstantaneous;
   config.terrain = tensegrity::Terrain::kSlope;
   config.shape = tensegrity::ShapeMethod::kTracker;

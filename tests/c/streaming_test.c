@@ -91,6 +91,7 @@ static void check_same(const tensegrity_estimator* estimator, int k) {
 static void check_states(enum reference_method method) {
   static tensegrity_estimator estimator, branch;
   static tensegrity_state state;
+  config.static_bias_initialization = method == REFERENCE_FULL; /* as the reference */
   CHECK((method == REFERENCE_FULL ? tensegrity_create_full : tensegrity_create_paper)(
             &estimator, &robot, &config) == TENSEGRITY_OK);
   reference_create(method);

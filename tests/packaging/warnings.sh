@@ -19,7 +19,7 @@ commands() {  # the longest first
     echo "g++ $core -DSCALAR=$scalar tests/packaging/all_headers.cpp"
   done
   for compiler in clang++ g++; do
-    echo "$compiler $cpp $(pkg-config --cflags ipopt) cpp/src/ipopt_solver.cpp"
+    echo "$compiler $cpp $(pkg-config --cflags ipopt | sed 's/-I/-isystem /g') cpp/src/ipopt_solver.cpp"
   done
   for compiler in clang gcc; do
     echo "$compiler -std=c99 $warnings -include tensegrity/tensegrity.h -x c /dev/null"
