@@ -172,7 +172,6 @@ void add_product(Scalar* p, int p_stride, const Scalar* a, int a_stride, const S
 template <typename P, typename W>
 void subtract_outer(Eigen::MatrixBase<P>& p, const Eigen::MatrixBase<W>& w, int count, int size) {
   static_assert(P::RowsAtCompileTime % 4 == 0 && W::RowsAtCompileTime % 4 == 0, "whole packets");
-  using Scalar = typename P::Scalar;
   constexpr int kRows = W::RowsAtCompileTime, kStride = P::RowsAtCompileTime;
   auto* to = &p.derived().coeffRef(0, 0);
   const auto* from = &w.derived().coeffRef(0, 0);

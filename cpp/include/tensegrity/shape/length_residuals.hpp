@@ -72,7 +72,8 @@ class LengthResiduals {
   // well. The lower triangle; a unit stiffness holds the spin about z.
   TangentMatrix<Scalar> hessian(const Rods<Scalar>& rods, bool second_order) const {
     // A cable resists along itself, and as it is tense also across.
-    const auto& [x, y, z] = directions_;
+    // (A structured binding would not do: in C++17 no lambda may capture it.)
+    const Lanes &x = directions_[0], &y = directions_[1], &z = directions_[2];
     Lanes tension = Lanes::Zero();
     if (second_order) tension = residuals_ * inverse_lengths_;
     const Lanes wx = (1 - tension) * x, wy = (1 - tension) * y, wz = (1 - tension) * z;
