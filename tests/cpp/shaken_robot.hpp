@@ -53,8 +53,12 @@ class Shaken {
     if (up.dot(q.col(2) - q.col(0)) < 0) up = -up;
   }
 
+  // Drawn one by one: compilers evaluate the arguments of a call in an order of their own, and the
+  // robot is to be shaken alike on every processor.
   V3 noise(Scalar size) {
-    return size * V3(Scalar(normal(random)), Scalar(normal(random)), Scalar(normal(random)));
+    V3 result;
+    for (int axis = 2; axis >= 0; --axis) result[axis] = size * Scalar(normal(random));
+    return result;
   }
 
   // IMU steps from `first` to before `last`, cables at every other.
@@ -73,8 +77,9 @@ class Shaken {
         estimator.cables(t, measured);
       }
       const Scalar shake = quiet ? Scalar(0) : (random() % 50 == 0 ? Scalar(80) : Scalar(3));
-      estimator.imu(t, noise(Scalar(0.002)) + noise(shake / 10),
-                    Scalar(9.81) * up + noise(Scalar(0.043)) + noise(shake));
+      const V3 accel = Scalar(9.81) * up + noise(Scalar(0.043)) + noise(shake);
+      const V3 gyro = noise(Scalar(0.002)) + noise(shake / 10);
+      estimator.imu(t, gyro, accel);
     }
   }
 
