@@ -61,6 +61,44 @@ TEST_CASE("a matrix that is not positive definite, or not finite, has no factors
   CHECK_FALSE(ldlt.factor(a));
 }
 
+TEST_CASE_TEMPLATE("packets: loads, sums and transposes", Scalar, double, float) {
+  using tensegrity::Packet;
+  Matrix<Scalar, 4> m = Matrix<Scalar, 4>::Random();
+  Packet<Scalar> columns[4];
+  for (int c = 0; c < 4; ++c) columns[c] = Packet<Scalar>(&m(0, c));
+  Packet<Scalar>::transpose(columns);
+  Matrix<Scalar, 4> transposed;
+  for (int c = 0; c < 4; ++c) columns[c].store(&transposed(0, c));
+  CHECK(transposed == m.transpose());
+
+  Packet<Scalar> sum(m(0, 0), m(1, 0), m(2, 0), m(3, 0));
+  sum.add(Scalar(2), Packet<Scalar>(&m(0, 1)));
+  sum.subtract(Scalar(3), Packet<Scalar>(&m(0, 2)));
+  Eigen::Matrix<Scalar, 4, 1> out;
+  sum.store(&out[0]);
+  CHECK((out - (m.col(0) + 2 * m.col(1) - 3 * m.col(2))).norm() <
+        10 * std::numeric_limits<Scalar>::epsilon());
+}
+
+template <int Rows>
+void check_sum() {
+  const Matrix<double, Rows, 5> columns = Matrix<double, Rows, 5>::Random();
+  const Eigen::Matrix<double, 5, 1> factors = Eigen::Matrix<double, 5, 1>::Random();
+  tensegrity::Sum<double, Rows, 5> sum;
+  for (int k = 0; k < 5; ++k) sum.add(factors[k], &columns(0, k));
+  Eigen::Matrix<double, Rows, 1> out;
+  sum.store(&out[0]);
+  CHECK((out - columns * factors).norm() < 1e-14);
+}
+
+TEST_CASE("sums of columns of any number of packets") {
+  check_sum<4>();
+  check_sum<16>();
+  check_sum<28>();
+  check_sum<36>();
+  check_sum<52>();
+}
+
 TEST_CASE("columns, outer products and mirrors of part of a covariance") {
   using P = Matrix<double, 28>;
   for (const int size : {16, 28}) {
@@ -71,6 +109,12 @@ TEST_CASE("columns, outer products and mirrors of part of a covariance") {
     tensegrity::add_columns(columns, 0, 9, m, 0, size);
     P expected = p;
     expected.middleCols<3>(0) += p.middleCols<3>(9) * m.transpose();
+    CHECK((columns - expected).norm() < 1e-14);
+
+    columns = p;
+    tensegrity::add_columns(columns, 3, 9, 0.7, size);
+    expected = p;
+    expected.middleCols<3>(3) += 0.7 * p.middleCols<3>(9);
     CHECK((columns - expected).norm() < 1e-14);
 
     tensegrity::mirror(p, size);
