@@ -124,11 +124,13 @@ void bind_solver(py::module_& m) {
   py::class_<Solver>(m, "ShapeSolver",
                      "Cable lengths -> endcaps by nonlinear least squares (T eq. 15a), in real "
                      "time. Warm from the last solution; cold after `reset`.")
-      .def(py::init([](const Robot& robot, int max_iterations, double tolerance) {
-             return Solver(robot, {max_iterations, tolerance});
+      .def(py::init([](const Robot& robot, int max_iterations, int max_cold_iterations,
+                       double tolerance) {
+             return Solver(robot, {max_iterations, max_cold_iterations, tolerance});
            }),
            py::arg("robot"), py::kw_only(),
            py::arg("max_iterations") = shape::SolverOptions<double>{}.max_iterations,
+           py::arg("max_cold_iterations") = shape::SolverOptions<double>{}.max_cold_iterations,
            py::arg("tolerance") = shape::SolverOptions<double>{}.tolerance)
       .def("solve", &Solver::solve, py::arg("lengths"),
            "Solves for lengths (9,) [m]; unless OK or NOT_CONVERGED the shape is unchanged.")

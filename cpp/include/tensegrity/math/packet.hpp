@@ -24,6 +24,14 @@ class Packet {
   static constexpr int kBytes = std::min(kWidth, 4 * int(sizeof(Scalar)));
   static constexpr int kRegisters = 4 * int(sizeof(Scalar)) / kBytes;
 
+  // So many packets can be held at once beside what a loop reads. Without SIMD each is four of the
+  // processor's registers.
+#ifdef EIGEN_VECTORIZE
+  static constexpr int kHeld = 8;
+#else
+  static constexpr int kHeld = 4;
+#endif
+
   Packet() = default;
   explicit Packet(const Scalar* rows) { std::memcpy(part_, rows, sizeof(part_)); }
   Packet(Scalar a, Scalar b, Scalar c, Scalar d) {

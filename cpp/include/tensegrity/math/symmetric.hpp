@@ -87,7 +87,7 @@ class Sum {
 
  private:
   // So many sums at once that none waits for its last addition, and all stay in registers.
-  static constexpr int kMost = 7;
+  static constexpr int kMost = Packet<Scalar>::kHeld - 1;
   static constexpr int kPackets = Rows / 4;
   static constexpr int kGroup = (kPackets + (kPackets - 1) / kMost) / ((kPackets - 1) / kMost + 1);
 
@@ -158,7 +158,7 @@ template <bool Subtract, typename Scalar>
 void add_product(Scalar* p, int p_stride, const Scalar* a, int a_stride, const Scalar* b,
                  int b_stride, int count, int first, int end) {
   int i = first;
-  if constexpr (Packet<Scalar>::kRegisters == 1) {  // tiles of two packets fit the registers
+  if constexpr (Packet<Scalar>::kHeld >= 8 * Packet<Scalar>::kRegisters) {
     for (; i + 8 <= end; i += 8) {
       detail::add_product_tile<2, Subtract>(p + i, p_stride, a + i, a_stride, b, b_stride, count);
     }
