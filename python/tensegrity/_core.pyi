@@ -65,7 +65,7 @@ class ShapeSolver:
     """
     Cable lengths -> endcaps by nonlinear least squares (T eq. 15a), in real time. Warm from the last solution; cold after `reset`.
     """
-    def __init__(self, robot: Prism, *, max_iterations: typing.SupportsInt | typing.SupportsIndex = 50, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> None:
+    def __init__(self, robot: Prism, *, max_iterations: typing.SupportsInt | typing.SupportsIndex = 50, max_cold_iterations: typing.SupportsInt | typing.SupportsIndex = 850, tolerance: typing.SupportsFloat | typing.SupportsIndex = 1e-06) -> None:
         ...
     def covariance(self, cable_std: typing.SupportsFloat | typing.SupportsIndex, *, prior_std: typing.SupportsFloat | typing.SupportsIndex = ...) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[18, 18]"]:
         """
