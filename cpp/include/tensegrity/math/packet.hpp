@@ -16,26 +16,42 @@ constexpr int padded(int size) { return (size + 3) / 4 * 4; }
 // The packet of four that `row` is in starts here.
 constexpr int packet_start(int row) { return row / 4 * 4; }
 
+namespace detail {
+
+// A register of `Bytes`, or a number by itself.
+template <typename Scalar, bool Simd, int Bytes>
+struct Register {
+  typedef Scalar Type __attribute__((vector_size(Bytes)));
+};
+template <typename Scalar, int Bytes>
+struct Register<Scalar, false, Bytes> {
+  using Type = Scalar;
+};
+
+}  // namespace detail
+
 template <typename Scalar>
 class Packet {
  public:
-  // Eigen aligns to the width of a register.
-  static constexpr int kWidth = std::max(EIGEN_MAX_STATIC_ALIGN_BYTES, 16);
-  static constexpr int kBytes = std::min(kWidth, 4 * int(sizeof(Scalar)));
-  static constexpr int kRegisters = 4 * int(sizeof(Scalar)) / kBytes;
-
-  // So many packets can be held at once beside what a loop reads. Without SIMD each is four of the
-  // processor's registers.
 #ifdef EIGEN_VECTORIZE
-  static constexpr int kHeld = 8;
+  static constexpr bool kSimd = true;
 #else
-  static constexpr int kHeld = 4;
+  static constexpr bool kSimd = false;
 #endif
+  // Eigen aligns to the width of a register.
+  static constexpr int kWidth = kSimd ? std::max(EIGEN_MAX_STATIC_ALIGN_BYTES, 16) : 1;
+  static constexpr int kBytes =
+      std::max(std::min(kWidth, 4 * int(sizeof(Scalar))), int(sizeof(Scalar)));
+  static constexpr int kRegisters = 4 * int(sizeof(Scalar)) / kBytes;
+  // So many packets can be held at once beside what a loop reads.
+  static constexpr int kHeld = kSimd ? 8 : 4;
 
   Packet() = default;
   explicit Packet(const Scalar* rows) { std::memcpy(part_, rows, sizeof(part_)); }
   Packet(Scalar a, Scalar b, Scalar c, Scalar d) {
-    if constexpr (kRegisters == 2) {
+    if constexpr (kRegisters == 4) {
+      part_[0] = a, part_[1] = b, part_[2] = c, part_[3] = d;
+    } else if constexpr (kRegisters == 2) {
       part_[0] = Register{a, b};
       part_[1] = Register{c, d};
     } else {
@@ -55,9 +71,11 @@ class Packet {
 
   // this + a x
   void add(Scalar a, const Packet& x) {
+#pragma GCC unroll 4
     for (int k = 0; k < kRegisters; ++k) part_[k] += a * x.part_[k];
   }
   void subtract(Scalar a, const Packet& x) {
+#pragma GCC unroll 4
     for (int k = 0; k < kRegisters; ++k) part_[k] -= a * x.part_[k];
   }
 
@@ -78,7 +96,11 @@ class Packet {
     }
 #endif
     const auto at = [&](int column, int row) {
-      return x[column].part_[row * kRegisters / 4][row % (4 / kRegisters)];
+      if constexpr (kRegisters == 4) {
+        return x[column].part_[row];
+      } else {
+        return x[column].part_[row * kRegisters / 4][row % (4 / kRegisters)];
+      }
     };
     const Packet r0(at(0, 0), at(1, 0), at(2, 0), at(3, 0)),
         r1(at(0, 1), at(1, 1), at(2, 1), at(3, 1)), r2(at(0, 2), at(1, 2), at(2, 2), at(3, 2)),
@@ -87,7 +109,7 @@ class Packet {
   }
 
  private:
-  typedef Scalar Register __attribute__((vector_size(kBytes)));
+  using Register = typename detail::Register<Scalar, kSimd, kBytes>::Type;
   Register part_[kRegisters] = {};
 };
 
