@@ -44,10 +44,8 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   transition.body_columns(p, B::Dim);
 
   // ---- F (P F'): rows from the diagonal on
-  for (int j = 0; j < B::kOffsets; ++j) {
-    if (j < B::kRates) {
-      p.col(j).template segment<12>(B::kEndcaps) += dt * p.col(j).template segment<12>(B::kRates);
-    }
+  for (int j = 0; j < B::kRates; ++j) {
+    p.col(j).template segment<12>(B::kEndcaps) += dt * p.col(j).template segment<12>(B::kRates);
   }
   for (int j = 0; j < B::kOffsets; j += 4) {
     transition.rows_of(p, j, B::kEndcaps, padded(B::kOffsets));
