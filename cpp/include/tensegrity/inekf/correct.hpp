@@ -10,60 +10,57 @@
 
 namespace tensegrity::inekf {
 
-// A linearised measurement of `Rows` rows, of a belief with at most `Anchors` anchors: fewer make
-// every matrix smaller.
+// A linearised measurement z = H e + n of `Rows` rows, of a belief with at most `Anchors` anchors:
+// fewer make every matrix smaller. Its parts are stacked as one elimination wants them.
 template <typename B, int Rows, int Anchors = B::MaxAnchors>
 struct Innovation {
   using Scalar = typename B::Scalar;
   static constexpr int kStates = padded(B::kAnchors + 3 * Anchors);
-  Vector<Scalar, Rows> residual;        // z = H e + n
-  Matrix<Scalar, kStates, Rows> cross;  // P H^T
-  Matrix<Scalar, Rows> covariance;      // S = H P H^T + N, lower triangle
+  using System = Ldlt<Scalar, Rows, kStates>;
+  System system;
+
+  void set_residual(const Vector<Scalar, Rows>& z) { system.set_right(z); }
+  auto cross() { return system.below(); }         // P H'
+  auto covariance() { return system.matrix(); }  // S = H P H' + N, lower triangle
 };
 
 template <typename Scalar>
 struct Correction {
   Status status = Status::kOk;
-  Scalar chi_square = 0;  // z^T S^-1 z, for as many degrees of freedom as rows
+  Scalar chi_square = 0;  // z' S^-1 z, for as many degrees of freedom as rows
 };
 
-// Applies the update unless z^T S^-1 z exceeds `gate` (0: no gate). On kRejected or kNotFinite the
-// belief is as it was.
+// Applies the update unless z' S^-1 z exceeds `gate` (0: no gate). On kRejected or kNotFinite the
+// belief is as it was. Uses the innovation up.
 //
-// With S = L D L^T, y = L^-1 z and W = P H^T L^-T: e = W D^-1 y and P <- P - W D^-1 W^T.
+// With S = L D L', y = L^-1 z and W = P H' L^-T: e = W D^-1 y and P <- P - W D^-1 W'.
 template <typename B, int Rows, int Anchors, typename Scalar = typename B::Scalar>
-Correction<Scalar> correct(B& belief, const Innovation<B, Rows, Anchors>& innovation, Scalar gate) {
+Correction<Scalar> correct(B& belief, Innovation<B, Rows, Anchors>& innovation, Scalar gate) {
   constexpr int kStates = Innovation<B, Rows, Anchors>::kStates;
   Correction<Scalar> result;
-  Ldlt<Scalar, Rows> factors;
-  if (!factors.factor(innovation.covariance)) {
+  auto& system = innovation.system;
+  if (!system.factor()) {
     result.status = Status::kNotFinite;
     return result;
   }
-  const Vector<Scalar, Rows> y = factors.forward(innovation.residual);
-  const Vector<Scalar, Rows> weighted = factors.inverse_diagonal().cwiseProduct(y);
-  const Scalar chi_square = y.dot(weighted);
-  result.chi_square = chi_square;
-  if (!std::isfinite(chi_square)) {
+  Sum<Scalar, kStates, Rows> error;
+  for (int j = 0; j < Rows; ++j) {
+    const Scalar weighted = system.inverse_diagonal()[j] * system.yd(j);
+    result.chi_square += weighted * system.yd(j);
+    error.add(weighted, system.wd(j));
+  }
+  if (!std::isfinite(result.chi_square)) {
     result.status = Status::kNotFinite;
     return result;
   }
-  if (gate > 0 && chi_square > gate) {
+  if (gate > 0 && result.chi_square > gate) {
     result.status = Status::kRejected;
     return result;
   }
-  Matrix<Scalar, kStates, Rows> w;
-  Sum<Scalar, kStates, Rows> error;
-  for (int j = 0; j < Rows; ++j) {
-    Sum<Scalar, kStates, Rows> column;
-    column.add(Scalar(1), &innovation.cross(0, j));
-    for (int k = 0; k < j; ++k) column.add(-factors.l(j, k), &w(0, k));
-    column.store(&w(0, j));
-    error.add(weighted[j], &w(0, j));
-  }
   typename B::ErrorVector e = B::ErrorVector::Zero();
   error.store(&e[0]);
-  for (int j = 0; j < Rows; ++j) w.col(j) *= std::sqrt(factors.inverse_diagonal()[j]);
+  auto w = innovation.cross();
+  for (int j = 0; j < Rows; ++j) w.col(j) *= std::sqrt(system.inverse_diagonal()[j]);
   subtract_outer(belief.covariance, w, Rows, kStates);
   belief.retract(e);
   return result;

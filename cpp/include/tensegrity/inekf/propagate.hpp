@@ -41,25 +41,23 @@ void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravit
   //   xi_d+ = xi_d + r turn x (e_z x xi_R) - int (d - r e_z) x R zeta_g
   const V3 up = V3::UnitZ();
   const bool rolls = rolling.radius > 0;
-  const M3 anchor_by_rotation = rolling.radius * hat(turn) * hat(up);
+  M3 anchor_by_rotation;
+  if (rolls) anchor_by_rotation = rolling.radius * hat(turn) * hat(up);
   const int n = belief.dim(), rows = padded(n);
   const int anchors = belief.anchor_count;
   Transition<Scalar, B::Covariance::RowsAtCompileTime> transition(body, noise.gyro, noise.accel);
   transition.set_zero(B::kExtra, B::kAnchors);
   transition.set_zero(n, rows);
 
-  // ---- P F': every row of it
+  // ---- P F'
   auto& p = belief.covariance;
   for (int i = 0; i < anchors; ++i) {
     const int at = B::anchor_index(i);
     if (rolls) belief.anchors.col(i) += rolling.radius * turn.cross(up);
-    const M3 by_gyro = body.column_by_gyro(belief.anchors.col(i) - rolling.radius * up);
-    if (rolls) {
-      add_columns(p, at, B::kRotation, anchor_by_rotation, 0, rows);
-      transition.group_columns(p, at, by_gyro, 0, rows);
-    } else {
-      transition.group_columns(p, at, by_gyro, rows);
-    }
+    const Block<Scalar> by_gyro = body.column_by_gyro(
+        Packet<Scalar>(V3(belief.anchors.col(i) - rolling.radius * up)));
+    if (rolls) add_columns(p, at, B::kRotation, anchor_by_rotation, 0, rows);
+    transition.group_columns(p, at, by_gyro, rolls ? 0 : packet_start(at), rows);
   }
   transition.body_columns(p, rows);
 
@@ -70,7 +68,7 @@ void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravit
       p.col(j).template segment<3>(B::anchor_index(i)) += rolled;
     }
   }
-  for (int j = 0; j < rows; j += 4) transition.rows_of(p, j, B::kAnchors, rows);
+  transition.all_rows(p, packet_start(B::kAnchors), rows);
 
   const auto walk = [&](int at, int size, Scalar std) {
     for (int k = at; k < at + size; ++k) p(k, k) += std * std * dt;

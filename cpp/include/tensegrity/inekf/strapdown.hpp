@@ -6,6 +6,9 @@
 // like a bias of this step alone.
 #pragma once
 
+#include <array>
+
+#include "tensegrity/math/packet.hpp"
 #include "tensegrity/math/so3.hpp"
 
 namespace tensegrity::inekf {
@@ -25,58 +28,93 @@ struct ImuSample {
 // a gyro error does to v and p through the rotation: derivatives of Gamma_1 a and Gamma_2 a.
 template <typename Scalar>
 struct Strapdown {
-  Scalar dt;              // [s]
-  Scalar fall;            // |g| dt [m/s]: g x xi_R dt = fall (xi_Ry, -xi_Rx, 0)
-  Matrix3<Scalar> int_r;  // int R [s]; by the accelerometer xi_v gets -int_r zeta_a
-  Matrix3<Scalar> velocity_by_gyro, position_by_gyro;
-  Matrix3<Scalar> position_by_accel;
+  Scalar dt;            // [s]
+  Scalar fall;          // |g| dt [m/s]: g x xi_R dt = fall (xi_Ry, -xi_Rx, 0)
+  Block<Scalar> int_r;  // int R [s]; by the accelerometer xi_v gets -int_r zeta_a
+  Block<Scalar> velocity_by_gyro, position_by_gyro;
+  Block<Scalar> position_by_accel;
 
   // What any other column of the group sees of a gyro error: -hat(x) int R.
-  Matrix3<Scalar> column_by_gyro(const Vector3<Scalar>& x) const {
-    Matrix3<Scalar> m;
-    for (int k = 0; k < 3; ++k) m.col(k) = int_r.col(k).cross(x);
+  Block<Scalar> column_by_gyro(const Packet<Scalar>& x) const {
+    Block<Scalar> m;
+    for (std::size_t k = 0; k < 3; ++k) m[k] = Packet<Scalar>::cross(int_r[k], x);
     return m;
   }
 };
 
-// m <- m - c a b
-template <typename Scalar>
-void subtract_product(Matrix3<Scalar>& m, Scalar c, const Matrix3<Scalar>& a,
-                      const Matrix3<Scalar>& b) {
-  for (int j = 0; j < 3; ++j) {
-    const Scalar x = c * b(0, j), y = c * b(1, j), z = c * b(2, j);
-    for (int i = 0; i < 3; ++i) m(i, j) -= a(i, 0) * x + a(i, 1) * y + a(i, 2) * z;
-  }
-}
-
 // Moves R, v [m/s] and p [m] by `imu` without its biases, over dt [s].
 //   R+ = R G0, v+ = v + R G1 a dt + g dt, p+ = p + v dt + R G2 a dt^2 + g dt^2/2
+//
+// With x = omega dt and y = R x all of it is made of the columns of R, y x R and y x (y x R):
+//   R Gamma_m(x) = R / m! + c_{m+1} hat(y) R + c_{m+2} hat(y)^2 R,
+//   R d(Gamma_m(x) a)/dx = -c hat(R a) R + d (y a' + (x'a) R) + s x',
+//   s = c* y x R a + d* y x (y x R a) - 2 d R a,
+// with c = c_{m+1}, d = c_{m+2} and their slopes c*, d*.
 template <typename Scalar, typename Velocity, typename Position>
 Strapdown<Scalar> integrate(Matrix3<Scalar>& rotation, Velocity&& velocity, Position&& position,
                             const ImuSample<Scalar>& imu, Scalar dt, Scalar gravity) {
+  using P = Packet<Scalar>;
   using V3 = Vector3<Scalar>;
-  using M3 = Matrix3<Scalar>;
+  const V3 x = imu.gyro * dt;
   const V3& a = imu.accel;
-  const V3 g(0, 0, -gravity);
-  const Gamma<Scalar> gamma(imu.gyro * dt);
-  const Scalar dt2 = dt * dt;
+  const RotationSeries<Scalar> c(x.squaredNorm());
+  const auto slopes = c.slopes();
+  const Scalar dt2 = dt * dt, dt3 = dt2 * dt;
 
-  const M3 start = rotation;
-  const M3 start_g2 = start * (dt2 * gamma.g2);
+  const Block<Scalar> r = {P(rotation.col(0)), P(rotation.col(1)), P(rotation.col(2))};
+  const auto turned = [&](const Block<Scalar>& m, const V3& v) {
+    P sum = v[0] * m[0];
+    sum.add(v[1], m[1]);
+    sum.add(v[2], m[2]);
+    return sum;
+  };
+  const auto combine = [](Scalar f, const P& u, Scalar g, const P& v, Scalar h, const P& w) {
+    P sum = f * u;
+    sum.add(g, v);
+    sum.add(h, w);
+    return sum;
+  };
+
+  const P y = turned(r, x), force = turned(r, a);
   Strapdown<Scalar> s;
   s.dt = dt;
   s.fall = gravity * dt;
-  s.int_r = start * (dt * gamma.g1);
-  position += velocity * dt + start_g2 * a + g * (dt2 / 2);
-  velocity += s.int_r * a + g * dt;
-  rotation = orthonormalized<Scalar>(start * gamma.g0);
-
-  const auto [g1_derivative, g2_derivative] = gamma.derivatives(a);
-  s.velocity_by_gyro = s.column_by_gyro(velocity);
-  s.position_by_gyro = s.column_by_gyro(position);
-  subtract_product(s.velocity_by_gyro, dt2, start, g1_derivative);
-  subtract_product(s.position_by_gyro, dt2 * dt, start, g2_derivative);
-  s.position_by_accel = -start_g2;
+  Block<Scalar> next, r_g2, across;  // R Gamma_0, R Gamma_2 dt^2, force x R
+  for (std::size_t j = 0; j < 3; ++j) {
+    const P once = P::cross(y, r[j]), twice = P::cross(y, once);
+    s.int_r[j] = combine(dt, r[j], dt * c.c2, once, dt * c.c3, twice);
+    r_g2[j] = combine(dt2 / 2, r[j], dt2 * c.c3, once, dt2 * c.c4, twice);
+    s.position_by_accel[j] = Scalar(-1) * r_g2[j];
+    across[j] = P::cross(force, r[j]);
+    next[j] = combine(Scalar(1), r[j], c.c1, once, c.c2, twice);
+  }
+  const P g(Scalar(0), Scalar(0), -gravity, Scalar(0));
+  const P start_velocity(velocity);
+  const P moved = P(position) + (dt * start_velocity + (turned(r_g2, a) + dt2 / 2 * g));
+  const P faster = start_velocity + (turned(s.int_r, a) + dt * g);
+  moved.store_vector(position);
+  faster.store_vector(velocity);
+  s.velocity_by_gyro = s.column_by_gyro(faster);
+  s.position_by_gyro = s.column_by_gyro(moved);
+  const Scalar xa = x.dot(a);
+  const P once = P::cross(y, force), twice = P::cross(y, once);
+  const P by_x1 = combine(slopes.c2, once, slopes.c3, twice, -2 * c.c3, force);
+  const P by_x2 = combine(slopes.c3, once, slopes.c4, twice, -2 * c.c4, force);
+  const auto subtract = [&](P& to, int j, Scalar dtn, Scalar c, Scalar d, const P& by_x) {
+    to.add(dtn * c, across[std::size_t(j)]);
+    to.subtract(dtn * d * a[j], y);
+    to.subtract(dtn * d * xa, r[std::size_t(j)]);
+    to.subtract(dtn * x[j], by_x);
+  };
+  for (int j = 0; j < 3; ++j) {
+    subtract(s.velocity_by_gyro[std::size_t(j)], j, dt2, c.c2, c.c3, by_x1);
+    subtract(s.position_by_gyro[std::size_t(j)], j, dt3, c.c3, c.c4, by_x2);
+  }
+  next = orthonormalized(next);
+  for (int j = 0; j < 3; ++j) {
+    auto column = rotation.col(j);
+    next[std::size_t(j)].store_vector(column);
+  }
   return s;
 }
 

@@ -22,19 +22,19 @@ class Transition {
   // `gyro_std` [rad/s] and `accel_std` [m/s^2]: of the sample.
   Transition(const Strapdown<Scalar>& body, Scalar gyro_std, Scalar accel_std)
       : body_(body), gyro_variance_(gyro_std * gyro_std), accel_variance_(accel_std * accel_std) {
-    by_.template topRows<kBody>().setZero();
     set_zero(kBody, kAccelBias + 3);
-    by_.template block<3, 3>(kRotation, 0) = -body.int_r;
-    by_.template block<3, 3>(kVelocity, 0) = body.velocity_by_gyro;
-    by_.template block<3, 3>(kPosition, 0) = body.position_by_gyro;
+    for (int k = 0; k < 3; ++k) {
+      const std::size_t column = std::size_t(k);
+      const Packet<Scalar> by_int_r = Scalar(-1) * body.int_r[column];
+      set_column(k, by_int_r, body.velocity_by_gyro[column], body.position_by_gyro[column]);
+      set_column(kByAccel + k, {}, by_int_r, body.position_by_accel[column]);
+      set_column(kByVelocity + k, {}, {}, body.dt * unit(k));
+    }
     // The body falls along z, about which no turn matters.
-    by_(kVelocity + 1, kByTilt) = -body.fall;
-    by_(kVelocity, kByTilt + 1) = body.fall;
-    by_(kPosition + 1, kByTilt) = -body.fall * body.dt / 2;
-    by_(kPosition, kByTilt + 1) = body.fall * body.dt / 2;
-    for (int k = 0; k < 3; ++k) by_(kPosition + k, kByVelocity + k) = body.dt;
-    by_.template block<3, 3>(kVelocity, kByAccel) = -body.int_r;
-    by_.template block<3, 3>(kPosition, kByAccel) = body.position_by_accel;
+    const Scalar half = body.dt / 2;
+    const Packet<Scalar> by_x = -body.fall * unit(1), by_y = body.fall * unit(0);
+    set_column(kByTilt, {}, by_x, half * by_x);
+    set_column(kByTilt + 1, {}, by_y, half * by_y);
   }
 
   // Rows that no error of the gyro reaches. Every row after those of the biases has to be set, by
@@ -48,7 +48,6 @@ class Transition {
   void body_columns(P& covariance, int rows) const {
     constexpr int kStride = P::RowsAtCompileTime;
     const Scalar fall = body_.fall, dt = body_.dt, half_fall = fall * dt / 2;
-    const M3 by_int_r = -body_.int_r;
     for (int i = 0; i < rows; i += 4) {
       Scalar* at = &covariance(i, 0);
       const auto load = [&](int column) { return Packet<Scalar>(at + column * kStride); };
@@ -56,15 +55,15 @@ class Transition {
       const Packet<Scalar> a0 = load(kAccelBias), a1 = load(kAccelBias + 1),
                            a2 = load(kAccelBias + 2);
       const Packet<Scalar> rx = load(kRotation), ry = load(kRotation + 1);
-      const auto turned = [&](const M3& m, int k, Packet<Scalar>& x) {
-        x.add(m(k, 0), g0);
-        x.add(m(k, 1), g1);
-        x.add(m(k, 2), g2);
+      const auto turned = [&](int row, Packet<Scalar>& x) {
+        x.add(by_(row, 0), g0);
+        x.add(by_(row, 1), g1);
+        x.add(by_(row, 2), g2);
       };
-      const auto accelerated = [&](const M3& m, int k, Packet<Scalar>& x) {
-        x.add(m(k, 0), a0);
-        x.add(m(k, 1), a1);
-        x.add(m(k, 2), a2);
+      const auto accelerated = [&](int row, Packet<Scalar>& x) {
+        x.add(by_(row, kByAccel), a0);
+        x.add(by_(row, kByAccel + 1), a1);
+        x.add(by_(row, kByAccel + 2), a2);
       };
       for (int k = 0; k < 3; ++k) {
         const Packet<Scalar> v = load(kVelocity + k);
@@ -72,67 +71,111 @@ class Transition {
         if (k == 0) v_next.add(fall, ry), p.add(half_fall, ry);
         if (k == 1) v_next.subtract(fall, rx), p.subtract(half_fall, rx);
         p.add(dt, v);
-        accelerated(body_.position_by_accel, k, p);
-        turned(body_.position_by_gyro, k, p);
+        accelerated(kPosition + k, p);
+        turned(kPosition + k, p);
         p.store(at + (kPosition + k) * kStride);
-        accelerated(by_int_r, k, v_next);
-        turned(body_.velocity_by_gyro, k, v_next);
+        accelerated(kVelocity + k, v_next);
+        turned(kVelocity + k, v_next);
         v_next.store(at + (kVelocity + k) * kStride);
       }
       for (int k = 0; k < 3; ++k) {
         Packet<Scalar> r = load(kRotation + k);
-        turned(by_int_r, k, r);
+        turned(kRotation + k, r);
         r.store(at + (kRotation + k) * kStride);
       }
     }
   }
 
-  // P F': columns at .. at + 2 of the group, which see a gyro error through `m`. Above the diagonal
-  // only the rows that `rows_of` reads, or from `first` on.
+  // P F': columns at .. at + 2 of the group, which see a gyro error through `m`; by ascending `at`.
+  // Rows from `first` on, and those that are read in rows_of.
   template <typename P>
-  void group_columns(P& covariance, int at, const M3& m, int rows) {
-    constexpr int kRead = packet_start(kGyroBias);
-    by_.template block<3, 3>(at, 0) = m;
-    add_columns(covariance, at, kGyroBias, m, kRead, kRead + 4);
-    add_columns(covariance, at, kGyroBias, m, packet_start(at), rows);
-  }
-  template <typename P>
-  void group_columns(P& covariance, int at, const M3& m, int first, int rows) {
-    by_.template block<3, 3>(at, 0) = m;
-    add_columns(covariance, at, kGyroBias, m, first, rows);
+  void group_columns(P& covariance, int at, const Block<Scalar>& m, int first, int rows) {
+    for (int k = 0; k < 3; ++k) m[std::size_t(k)].store(&by_(at, k));
+    add_columns(covariance, at, kGyroBias, by_.template block<3, 3>(at, 0), first, rows,
+                first > kReadRows ? kReadRows : -1);
   }
 
-  // F (P F') and the noise of the sample: rows of columns j .. j + 3 from the packet on their
-  // diagonal on. Rows of the group after the body's begin at `group`.
+  // F (P F') and the noise of the sample, from the diagonal on. Rows of the group after the body's
+  // begin at `group`, a multiple of four; all end at `rows`.
   template <typename P>
-  void rows_of(P& covariance, int j, int group, int rows) const {
-    constexpr int kStride = P::RowsAtCompileTime;
-    Scalar* x = &covariance(0, j);
-    const Scalar* a = &by_(0, 0);
-    Scalar b[kColumns][4];
-    for (int c = 0; c < 4; ++c) {
-      for (int k = 0; k < 3; ++k) {
-        b[k][c] = x[c * kStride + kGyroBias + k] + gyro_variance_ * by_(j + c, k);
+  void all_rows(P& covariance, int group, int rows) const {
+    const auto p = columns(covariance);
+    const auto by = columns(by_);
+    // Rows of P F' that A has columns for: for the body's, and of zeta_bg.
+    alignas(4 * sizeof(Scalar)) Scalar seen[kColumns][4];
+    alignas(4 * sizeof(Scalar)) Scalar gyro[3][Rows];
+    for (int j = 0; j < rows; j += 4) {
+      const auto own = p.from_column(j);
+      Packet<Scalar> x0, x1, x2, x3;
+      const auto load = [&](int at) {
+        x0 = Packet<Scalar>(own[0] + at);
+        x1 = Packet<Scalar>(own[1] + at);
+        x2 = Packet<Scalar>(own[2] + at);
+        x3 = Packet<Scalar>(own[3] + at);
+        Packet<Scalar>::transpose(x0, x1, x2, x3);
+      };
+      const auto noisy = [&](Packet<Scalar> row, Scalar variance, int column) {
+        row.add(variance, Packet<Scalar>(by[column] + j));
+        return row;
+      };
+      load(kReadRows);
+      const Packet<Scalar> gx = noisy(x1, gyro_variance_, 0), gy = noisy(x2, gyro_variance_, 1),
+                           gz = noisy(x3, gyro_variance_, 2);
+      gx.store(gyro[0] + j);
+      gy.store(gyro[1] + j);
+      gz.store(gyro[2] + j);
+      if (j >= kBody) continue;
+      gx.store(seen[0]);
+      gy.store(seen[1]);
+      gz.store(seen[2]);
+      load(kAccelBias);
+      noisy(x0, accel_variance_, kByAccel).store(seen[kByAccel]);
+      noisy(x1, accel_variance_, kByAccel + 1).store(seen[kByAccel + 1]);
+      noisy(x2, accel_variance_, kByAccel + 2).store(seen[kByAccel + 2]);
+      load(0);
+      x0.store(seen[kByTilt]);
+      x1.store(seen[kByTilt + 1]);
+      x3.store(seen[kByVelocity]);
+      load(4);
+      x0.store(seen[kByVelocity + 1]);
+      x1.store(seen[kByVelocity + 2]);
+      add_product<false>(own, by, Columns<const Scalar, 4>{seen[0]}, kColumns, j, kBody);
+    }
+    const Columns<const Scalar, Rows> errors{gyro[0]};
+    for (int row = group; row < rows; row += 4 * kGroup) {
+      const int left = (rows - row) / 4;
+      const auto rest = p.from(row);
+      const auto a = by.from(row);
+      if (left >= kGroup) {
+        add_rows<kGroup>(rest, a, errors, row + 4 * kGroup);
+      } else if (left == 2) {
+        add_rows<2>(rest, a, errors, rows);
+      } else {
+        add_rows<1>(rest, a, errors, rows);
       }
     }
-    if (j < kBody) {
-      for (int c = 0; c < 4; ++c) {
-        const Scalar* column = x + c * kStride;
-        for (int k = 0; k < 2; ++k) b[kByTilt + k][c] = column[k];
-        for (int k = 0; k < 3; ++k) {
-          b[kByVelocity + k][c] = column[kVelocity + k];
-          b[kByAccel + k][c] = column[kAccelBias + k] + accel_variance_ * by_(j + c, kByAccel + k);
-        }
-      }
-      add_product<false>(x, kStride, a, Rows, b[0], 4, kColumns, j, kBody);
-    }
-    add_product<false>(x, kStride, a, Rows, b[0], 4, 3, std::max(j, packet_start(group)), rows);
   }
 
  private:
   static constexpr int kBody = padded(kGyroBias);  // rows of the body
   // Columns of A that are not zero: zeta_bg, and in the body's rows xi_Rx, xi_Ry, xi_v, zeta_ba.
+  static constexpr int kReadRows = packet_start(kGyroBias);
+  static constexpr int kGroup = 3;  // packets of the group's rows at once
+  static_assert(kGyroBias % 4 == 1 && kAccelBias % 4 == 0 && kRotation == 0 && kVelocity == 3);
   static constexpr int kByTilt = 3, kByVelocity = 5, kByAccel = 8, kColumns = 11;
+
+  static Packet<Scalar> unit(int k) {
+    return {Scalar(k == 0), Scalar(k == 1), Scalar(k == 2), Scalar(0)};
+  }
+  // A column of A in the body's rows. In ascending order: the fourth number of a packet is none.
+  void set_column(int column, const Packet<Scalar>& rotation, const Packet<Scalar>& velocity,
+                  const Packet<Scalar>& position) {
+    Scalar* at = &by_(0, column);
+    Packet<Scalar>().store(at + kBody - 4);
+    rotation.store(at + kRotation);
+    velocity.store(at + kVelocity);
+    position.store(at + kPosition);
+  }
 
   const Strapdown<Scalar>& body_;
   Scalar gyro_variance_, accel_variance_;

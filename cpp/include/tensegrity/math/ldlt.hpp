@@ -1,102 +1,117 @@
-// L D L' factors of small symmetric matrices of fixed size.
+// Elimination in small symmetric systems of fixed size: A = L D L' together with what stands below.
 //
 // Eigen's LDLT and LLT go through code for any size; at ten rows that takes several times as long
-// as the arithmetic.
+// as the arithmetic. What a filter or a solver needs of A are products with L^-1, and those are the
+// same elimination continued below A:
+//
+//   [ A  ]        [ L  ]
+//   [ b' ]   ->   [ y' ] D,   y = (L D)^-1 b,   W = B (L D)^-T.
+//   [ B  ]        [ W  ]
 #pragma once
 
 #include <cmath>
 
-#include "tensegrity/math/symmetric.hpp"
+#include "tensegrity/math/packet.hpp"
+#include "tensegrity/types.hpp"
 
 namespace tensegrity {
 
-// A = L D L' with a unit lower triangular L. Reads the lower triangle of A.
-template <typename Scalar, int N>
+template <typename Scalar, int N, int Below = 0>
 class Ldlt {
  public:
-  // False unless A is positive definite (to rounding) and finite.
-  bool factor(const Matrix<Scalar, N>& a) {
-    for (int j = 0; j < N; ++j) {  // whole packets from the one on the diagonal on
-      for (int i = packet_start(j); i < j; ++i) l_(i, j) = 0;
-      for (int i = j; i < N; ++i) l_(i, j) = a(i, j);
-      for (int i = N; i < kRows; ++i) l_(i, j) = 0;
+  // Where a column holds b and B. B has `Below` rows, a multiple of four.
+  static constexpr int kRight = N;
+  static constexpr int kBelow = padded(N + 1);
+
+  // To be filled before `factor`: of A the lower triangle, b if `solve` or `y` is to be called. What
+  // is above the diagonal does not matter.
+  Scalar* column(int j) { return &columns_(0, j); }
+  auto matrix() { return columns_.template topRows<N>(); }
+  auto below() { return columns_.template bottomRows<Below>(); }
+  void set_right(const Vector<Scalar, N>& b) {
+    for (int j = 0; j < N; ++j) {
+      columns_(kRight, j) = b[j];
+      for (int i = kRight + 1; i < kBelow; ++i) columns_(i, j) = 0;
     }
-    return factor_from<0>();
   }
 
-  // L^-1 b
-  Vector<Scalar, N> forward(const Vector<Scalar, N>& b) const {
-    Column x = Column::Zero();
-    x.template head<N>() = b;
-    for (int j = 0; j < N; ++j) {
-      const Scalar factor = x[j];
-      for (int i = packet_start(j); i < kRows; i += 4) {
-        Packet<Scalar> rest(&x[i]);
-        rest.subtract(factor, Packet<Scalar>(&l_(i, j)));
-        rest.store(&x[i]);
-      }
-    }
-    return x.template head<N>();
-  }
+  // False unless A is positive definite (to rounding) and finite.
+  bool factor() { return factor_from<0>(); }
+
+  // After `factor`, with D^-1 at hand every column is known up to its factor D.
+  const Vector<Scalar, N>& inverse_diagonal() const { return inverse_; }
+  Scalar ld(int row, int column) const { return columns_(row, column); }  // L D
+  Scalar yd(int j) const { return columns_(kRight, j); }                  // L^-1 b
+  const Scalar* wd(int j) const { return &columns_(kBelow, j); }          // B L^-T, column j
 
   // A^-1 b
-  Vector<Scalar, N> solve(const Vector<Scalar, N>& b) const {
-    Vector<Scalar, N> x = forward(b).cwiseProduct(inverse_);
+  Vector<Scalar, N> solve() const {
+    Vector<Scalar, N> x;
     // Unrolled, and what was found last comes last: the chain of dependent operations is short.
 #pragma GCC unroll 16
     for (int j = N - 1; j >= 0; --j) {
+      Scalar rest = yd(j);
 #pragma GCC unroll 16
-      for (int i = N - 1; i > j; --i) x[j] -= l_(i, j) * x[i];
+      for (int i = N - 1; i > j; --i) rest -= columns_(i, j) * x[i];
+      x[j] = rest * inverse_[j];
     }
     return x;
   }
 
-  // L without its diagonal.
-  Scalar l(int row, int column) const { return l_(row, column); }
-  // 1 / D
-  const Vector<Scalar, N>& inverse_diagonal() const { return inverse_; }
+  // B becomes B A^-1.
+  void solve_below() {
+    for (int j = N - 1; j >= 0; --j) {
+      for (int r = kBelow; r < kRows; r += 4) {
+        Packet<Scalar> rest(&columns_(r, j));
+        for (int i = j + 1; i < N; ++i) {
+          rest.subtract(columns_(i, j), Packet<Scalar>(&columns_(r, i)));
+        }
+        Packet<Scalar> solved;
+        solved.add(inverse_[j], rest);
+        solved.store(&columns_(r, j));
+      }
+    }
+  }
 
  private:
-  static constexpr int kRows = padded(N);  // whole packets
-  using Column = Vector<Scalar, kRows>;
+  static_assert(Below % 4 == 0, "whole packets");
+  static constexpr int kRows = kBelow + Below;
 
-  // Four columns from `First` on, and those after them. A column of A less what the columns before
-  // it hold of it is d times that of L.
+  // Four columns from `First` on, and those after them.
   template <int First>
   bool factor_from() {
-    constexpr int kPackets = (kRows - First) / 4;
     for (int j = First; j < std::min(First + 4, N); ++j) {
-      Packet<Scalar> rest[kPackets];
-#pragma GCC unroll 5
-      for (int i = 0; i < kPackets; ++i) rest[i] = Packet<Scalar>(&l_(First + 4 * i, j));
-      for (int k = 0; k < j; ++k) {
-        const Scalar factor = l_(j, k) * pivots_[k];
-#pragma GCC unroll 5
-        for (int i = 0; i < kPackets; ++i) {
-          rest[i].subtract(factor, Packet<Scalar>(&l_(First + 4 * i, k)));
-        }
-      }
-      rest[0].store(&l_(First, j));
-      const Scalar pivot = l_(j, j);
+      reduce<First / 4>(j);
+      const Scalar pivot = columns_(j, j);
       if (!(pivot > 0) || !std::isfinite(pivot)) return false;
-      pivots_[j] = pivot;
       inverse_[j] = 1 / pivot;
-#pragma GCC unroll 5
-      for (int i = 0; i < kPackets; ++i) {
-        Packet<Scalar> column;
-        column.add(inverse_[j], rest[i]);
-        column.store(&l_(First + 4 * i, j));
-      }
-      for (int i = 0; i < 4; ++i) {
-        if (First + i <= j) l_(First + i, j) = 0;
-      }
     }
     if constexpr (First + 4 < N) return factor_from<First + 4>();
     return true;
   }
 
-  Matrix<Scalar, kRows, N> l_;          // not set above the packets on the diagonal
-  Vector<Scalar, N> pivots_, inverse_;  // D, 1 / D
+  // Column j less what the columns before it hold of it, from packet `From` on. The chain from pivot
+  // to pivot is what takes the time; all that is below fits into its pauses.
+  template <int From>
+  void reduce(int j) {
+    constexpr int kHere = std::min(kRows / 4 - From, Packet<Scalar>::kHeld);
+    Scalar* column = &columns_(4 * From, j);
+    Packet<Scalar> rest[kHere];
+#pragma GCC unroll 12
+    for (int i = 0; i < kHere; ++i) rest[i] = Packet<Scalar>(column + 4 * i);
+    for (int k = 0; k < j; ++k) {
+      const Scalar factor = columns_(j, k) * inverse_[k];
+      const Scalar* before = &columns_(4 * From, k);
+#pragma GCC unroll 12
+      for (int i = 0; i < kHere; ++i) rest[i].subtract(factor, Packet<Scalar>(before + 4 * i));
+    }
+#pragma GCC unroll 12
+    for (int i = 0; i < kHere; ++i) rest[i].store(column + 4 * i);
+    if constexpr (From + kHere < kRows / 4) reduce<From + kHere>(j);
+  }
+
+  Matrix<Scalar, kRows, N> columns_;
+  Vector<Scalar, N> inverse_;  // 1 / D
 };
 
 }  // namespace tensegrity

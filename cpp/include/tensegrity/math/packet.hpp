@@ -7,7 +7,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <cstring>
 
 namespace tensegrity {
 
@@ -22,10 +21,17 @@ namespace detail {
 template <typename Scalar, bool Simd, int Bytes>
 struct Register {
   typedef Scalar Type __attribute__((vector_size(Bytes)));
+  // The same anywhere in an array of numbers.
+  typedef Scalar Unaligned
+      __attribute__((vector_size(Bytes), aligned(alignof(Scalar)), may_alias));
+  static Type load(const Scalar* at) { return *reinterpret_cast<const Unaligned*>(at); }
+  static void store(Scalar* at, const Type& x) { *reinterpret_cast<Unaligned*>(at) = x; }
 };
 template <typename Scalar, int Bytes>
 struct Register<Scalar, false, Bytes> {
   using Type = Scalar;
+  static Type load(const Scalar* at) { return *at; }
+  static void store(Scalar* at, Type x) { *at = x; }
 };
 
 }  // namespace detail
@@ -43,11 +49,14 @@ class Packet {
   static constexpr int kBytes =
       std::max(std::min(kWidth, 4 * int(sizeof(Scalar))), int(sizeof(Scalar)));
   static constexpr int kRegisters = 4 * int(sizeof(Scalar)) / kBytes;
-  // So many packets can be held at once beside what a loop reads.
-  static constexpr int kHeld = kSimd ? 8 : 4;
+  // So many packets can be held at once beside what a loop reads: of sixteen registers, or more.
+  static constexpr int kHeld = kSimd ? 12 / kRegisters : 4;
 
   Packet() = default;
-  explicit Packet(const Scalar* rows) { std::memcpy(part_, rows, sizeof(part_)); }
+  explicit Packet(const Scalar* rows) {
+#pragma GCC unroll 4
+    for (int k = 0; k < kRegisters; ++k) part_[k] = InMemory::load(rows + k * 4 / kRegisters);
+  }
   Packet(Scalar a, Scalar b, Scalar c, Scalar d) {
     if constexpr (kRegisters == 4) {
       part_[0] = a, part_[1] = b, part_[2] = c, part_[3] = d;
@@ -59,7 +68,16 @@ class Packet {
     }
   }
 
-  void store(Scalar* rows) const { std::memcpy(rows, part_, sizeof(part_)); }
+  // Three numbers, and a zero.
+  template <typename Derived>
+  explicit Packet(const Eigen::MatrixBase<Derived>& v) : Packet(v[0], v[1], v[2], Scalar(0)) {
+    static_assert(Derived::SizeAtCompileTime == 3, "a vector of three");
+  }
+
+  void store(Scalar* rows) const {
+#pragma GCC unroll 4
+    for (int k = 0; k < kRegisters; ++k) InMemory::store(rows + k * 4 / kRegisters, part_[k]);
+  }
 
   // Stays in its registers: GCC would read it again from memory for every use, and loads, not
   // arithmetic, would then set the pace.
@@ -79,37 +97,79 @@ class Packet {
     for (int k = 0; k < kRegisters; ++k) part_[k] -= a * x.part_[k];
   }
 
-  // Rows of four packets become columns.
-  static void transpose(Packet (&x)[4]) {
+  friend Packet operator*(Scalar a, Packet x) {
+#pragma GCC unroll 4
+    for (int k = 0; k < kRegisters; ++k) x.part_[k] *= a;
+    return x;
+  }
+  friend Packet operator*(Packet x, const Packet& y) {
+#pragma GCC unroll 4
+    for (int k = 0; k < kRegisters; ++k) x.part_[k] *= y.part_[k];
+    return x;
+  }
+  friend Packet operator+(Packet x, const Packet& y) {
+#pragma GCC unroll 4
+    for (int k = 0; k < kRegisters; ++k) x.part_[k] += y.part_[k];
+    return x;
+  }
+
+  // The first three numbers.
+  template <typename Derived>
+  void store_vector(Eigen::MatrixBase<Derived>& v) const {
+    static_assert(Derived::SizeAtCompileTime == 3, "a vector of three");
+    v.derived() << at(0), at(1), at(2);
+  }
+
+  // Of the first three numbers; the fourth becomes zero (or stays not finite).
+  static Packet cross(const Packet& a, const Packet& b) {
 #if __has_builtin(__builtin_shufflevector)
     if constexpr (kRegisters == 1) {
-      const Register a = x[0].part_[0], b = x[1].part_[0], c = x[2].part_[0], d = x[3].part_[0];
+      const auto next = [](const Register& x) { return __builtin_shufflevector(x, x, 1, 2, 0, 3); };
+      const Register u = a.part_[0], v = b.part_[0];
+      Packet out;
+      out.part_[0] = next(u * next(v) - next(u) * v);
+      return out;
+    }
+#endif
+    const Scalar x = a.at(0), y = a.at(1), z = a.at(2);
+    return {y * b.at(2) - z * b.at(1), z * b.at(0) - x * b.at(2), x * b.at(1) - y * b.at(0),
+            Scalar(0)};
+  }
+
+  // The number in `row`.
+  Scalar at(int row) const {
+    if constexpr (kRegisters == 4) {
+      return part_[row];
+    } else {
+      return part_[row * kRegisters / 4][row % (4 / kRegisters)];
+    }
+  }
+
+  // Columns of a block of four by four become its rows.
+  static void transpose(Packet& x0, Packet& x1, Packet& x2, Packet& x3) {
+#if __has_builtin(__builtin_shufflevector)
+    if constexpr (kRegisters == 1) {
+      const Register a = x0.part_[0], b = x1.part_[0], c = x2.part_[0], d = x3.part_[0];
       const Register ab_02 = __builtin_shufflevector(a, b, 0, 4, 2, 6);
       const Register ab_13 = __builtin_shufflevector(a, b, 1, 5, 3, 7);
       const Register cd_02 = __builtin_shufflevector(c, d, 0, 4, 2, 6);
       const Register cd_13 = __builtin_shufflevector(c, d, 1, 5, 3, 7);
-      x[0].part_[0] = __builtin_shufflevector(ab_02, cd_02, 0, 1, 4, 5);
-      x[1].part_[0] = __builtin_shufflevector(ab_13, cd_13, 0, 1, 4, 5);
-      x[2].part_[0] = __builtin_shufflevector(ab_02, cd_02, 2, 3, 6, 7);
-      x[3].part_[0] = __builtin_shufflevector(ab_13, cd_13, 2, 3, 6, 7);
+      x0.part_[0] = __builtin_shufflevector(ab_02, cd_02, 0, 1, 4, 5);
+      x1.part_[0] = __builtin_shufflevector(ab_13, cd_13, 0, 1, 4, 5);
+      x2.part_[0] = __builtin_shufflevector(ab_02, cd_02, 2, 3, 6, 7);
+      x3.part_[0] = __builtin_shufflevector(ab_13, cd_13, 2, 3, 6, 7);
       return;
     }
 #endif
-    const auto at = [&](int column, int row) {
-      if constexpr (kRegisters == 4) {
-        return x[column].part_[row];
-      } else {
-        return x[column].part_[row * kRegisters / 4][row % (4 / kRegisters)];
-      }
-    };
-    const Packet r0(at(0, 0), at(1, 0), at(2, 0), at(3, 0)),
-        r1(at(0, 1), at(1, 1), at(2, 1), at(3, 1)), r2(at(0, 2), at(1, 2), at(2, 2), at(3, 2)),
-        r3(at(0, 3), at(1, 3), at(2, 3), at(3, 3));
-    x[0] = r0, x[1] = r1, x[2] = r2, x[3] = r3;
+    const Packet r0(x0.at(0), x1.at(0), x2.at(0), x3.at(0)),
+        r1(x0.at(1), x1.at(1), x2.at(1), x3.at(1)), r2(x0.at(2), x1.at(2), x2.at(2), x3.at(2)),
+        r3(x0.at(3), x1.at(3), x2.at(3), x3.at(3));
+    x0 = r0, x1 = r1, x2 = r2, x3 = r3;
   }
 
  private:
-  using Register = typename detail::Register<Scalar, kSimd, kBytes>::Type;
+  using InMemory = detail::Register<Scalar, kSimd, kBytes>;
+  using Register = typename InMemory::Type;
   Register part_[kRegisters] = {};
 };
 

@@ -4,8 +4,10 @@
 // operator*, and the left Jacobian J_l with Exp(x + J_l(x)^-1 dx) ~ Exp(dx) Exp(x).
 #pragma once
 
+#include <array>
 #include <cmath>
 
+#include "tensegrity/math/packet.hpp"
 #include "tensegrity/types.hpp"
 
 namespace tensegrity {
@@ -24,6 +26,54 @@ Vector3<typename Derived::Scalar> vee(const Eigen::MatrixBase<Derived>& m) {
   return {m(2, 1), m(0, 2), m(1, 0)};
 }
 
+// c_m = sum_k (-a^2)^k / (2 k + m)! for the angle a: what the integrals of a rotation are made of.
+template <typename Scalar>
+struct RotationSeries {
+  Scalar c1, c2, c3, c4;
+
+  explicit RotationSeries(Scalar a2) : squared_angle_(a2) {
+    // Stable for small angles. Reciprocals are written out: a division takes as long as ten
+    // multiplications.
+    if (a2 < small_angle_squared()) {
+      c1 = 1 - a2 * over(6) * (1 - a2 * over(20) * (1 - a2 * over(42)));
+      c2 = over(2) - a2 * over(24) * (1 - a2 * over(30) * (1 - a2 * over(56)));
+      c3 = over(6) - a2 * over(120) * (1 - a2 * over(42) * (1 - a2 * over(72)));
+      c4 = over(24) - a2 * over(720) * (1 - a2 * over(56) * (1 - a2 * over(90)));
+    } else {
+      const Scalar a = std::sqrt(a2);
+      c1 = std::sin(a) / a;
+      c2 = (1 - std::cos(a)) / a2;
+      c3 = (1 - c1) / a2;
+      c4 = (Scalar(0.5) - c2) / a2;
+    }
+  }
+
+  // (dc_m/da) / a = (c_{m-1} - m c_m) / a^2, which cancels for small a: there by its series, whose
+  // next term is below 1e-12 of it at a = 0.3.
+  struct Slopes {
+    Scalar c2, c3, c4;
+  };
+  Slopes slopes() const {
+    const Scalar a2 = squared_angle_;
+    if (a2 < Scalar(0.1)) {
+      return {-over(12) + a2 * over(180) * (1 - a2 * over(112) * 3 * (1 - a2 * over(135) * 2)),
+              -over(60) + a2 * over(1260) * (1 - a2 * over(48) * (1 - a2 * over(165) * 2)),
+              -over(360) + a2 * over(10080) * (1 - a2 * over(60) * (1 - a2 * over(99)))};
+    }
+    const Scalar inverse = 1 / a2;
+    return {(c1 - 2 * c2) * inverse, (c2 - 3 * c3) * inverse, (c3 - 4 * c4) * inverse};
+  }
+
+  // Below this the series above is exact to rounding: the first omitted term is a^8 / 9! of one.
+  static constexpr Scalar small_angle_squared() {
+    return sizeof(Scalar) == sizeof(float) ? Scalar(0.05) : Scalar(0.01);
+  }
+  static constexpr Scalar over(int n) { return Scalar(1) / Scalar(n); }
+
+ private:
+  Scalar squared_angle_;
+};
+
 // Gamma_m(x) = sum_k hat(x)^k / (k + m)!  (Bloesch et al. 2013; Hartley et al. 2020, eq. 33).
 //
 // Gamma_0 = Exp, Gamma_1 = left Jacobian, Gamma_2 appears in the position integral of a constant
@@ -32,64 +82,17 @@ template <typename Scalar>
 struct Gamma {
   Matrix3<Scalar> g0, g1, g2;
 
-  explicit Gamma(const Vector3<Scalar>& x) : x_(x) {
-    const Scalar a2 = x.squaredNorm();
-    // c_m: coefficients of hat(x)^m in the sums, stable for small angles. Reciprocals are written
-    // out: a division takes as long as ten multiplications.
-    if (a2 < small_angle_squared()) {
-      c1_ = 1 - a2 * over(6) * (1 - a2 * over(20) * (1 - a2 * over(42)));
-      c2_ = over(2) - a2 * over(24) * (1 - a2 * over(30) * (1 - a2 * over(56)));
-      c3_ = over(6) - a2 * over(120) * (1 - a2 * over(42) * (1 - a2 * over(72)));
-      c4_ = over(24) - a2 * over(720) * (1 - a2 * over(56) * (1 - a2 * over(90)));
-    } else {
-      const Scalar a = std::sqrt(a2);
-      c1_ = std::sin(a) / a;
-      c2_ = (1 - std::cos(a)) / a2;
-      c3_ = (1 - c1_) / a2;
-      c4_ = (Scalar(0.5) - c2_) / a2;
-    }
-    g0 = sum(1, c1_, c2_);
-    g1 = sum(1, c2_, c3_);
-    g2 = sum(over(2), c3_, c4_);
-  }
-
-  // d(Gamma_1(x) b)/dx and d(Gamma_2(x) b)/dx: how velocity and position after a constant specific
-  // force b change with the rotation on the way.
-  struct Derivatives {
-    Matrix3<Scalar> g1, g2;
-  };
-  Derivatives derivatives(const Vector3<Scalar>& b) const {
-    const Slopes k = slopes();
-    return {derivative(b, c2_, k.c2, c3_, k.c3), derivative(b, c3_, k.c3, c4_, k.c4)};
-  }
-
-  // Below this the series above is exact to rounding: the first omitted term is a^8 / 9! of one.
-  static constexpr Scalar small_angle_squared() {
-    return sizeof(Scalar) == sizeof(float) ? Scalar(0.05) : Scalar(0.01);
+  explicit Gamma(const Vector3<Scalar>& x) {
+    const RotationSeries<Scalar> s(x.squaredNorm());
+    g0 = sum(x, 1, s.c1, s.c2);
+    g1 = sum(x, 1, s.c2, s.c3);
+    g2 = sum(x, Scalar(0.5), s.c3, s.c4);
   }
 
  private:
-  static constexpr Scalar over(int n) { return Scalar(1) / Scalar(n); }
-
-  struct Slopes {
-    Scalar c2, c3, c4;
-  };
-  // (dc_m/da) / a = (c_{m-1} - m c_m) / a^2, which cancels for small a: there by its series, whose
-  // next term is below 1e-12 of it at a = 0.3.
-  Slopes slopes() const {
-    const Scalar a2 = x_.squaredNorm();
-    if (a2 < Scalar(0.1)) {
-      return {-over(12) + a2 * over(180) * (1 - a2 * over(112) * 3 * (1 - a2 * over(135) * 2)),
-              -over(60) + a2 * over(1260) * (1 - a2 * over(48) * (1 - a2 * over(165) * 2)),
-              -over(360) + a2 * over(10080) * (1 - a2 * over(60) * (1 - a2 * over(99)))};
-    }
-    const Scalar inverse = 1 / a2;
-    return {(c1_ - 2 * c2_) * inverse, (c2_ - 3 * c3_) * inverse, (c3_ - 4 * c4_) * inverse};
-  }
-
   // a I + b hat(x) + c hat(x)^2
-  Matrix3<Scalar> sum(Scalar a, Scalar b, Scalar c) const {
-    const Scalar x = x_[0], y = x_[1], z = x_[2];
+  static Matrix3<Scalar> sum(const Vector3<Scalar>& v, Scalar a, Scalar b, Scalar c) {
+    const Scalar x = v[0], y = v[1], z = v[2];
     const Scalar cxy = c * x * y, cxz = c * x * z, cyz = c * y * z;
     Matrix3<Scalar> m;
     m << a - c * (y * y + z * z), cxy - b * z, cxz + b * y,  //
@@ -97,31 +100,11 @@ struct Gamma {
         cxz - b * y, cyz + b * x, a - c * (x * x + y * y);
     return m;
   }
-
-  // d/dx of c x b + d x (x b), with slopes cs and ds of c and d:
-  //   -c hat(b) + d (x b' - 2 b x' + x'b I) + (cs x x b + ds x x (x x b)) x'
-  Matrix3<Scalar> derivative(const Vector3<Scalar>& b, Scalar c, Scalar cs, Scalar d,
-                             Scalar ds) const {
-    const Scalar xb = x_.dot(b), xx = x_.squaredNorm();
-    const Vector3<Scalar> across = x_.cross(b);
-    Matrix3<Scalar> m;
-    for (int i = 0; i < 3; ++i) {
-      const Scalar by_x = cs * across[i] + ds * (x_[i] * xb - b[i] * xx) - 2 * d * b[i];
-      for (int j = 0; j < 3; ++j) m(i, j) = by_x * x_[j] + d * x_[i] * b[j];
-      m(i, i) += d * xb;
-    }
-    m(0, 1) += c * b[2];
-    m(1, 0) -= c * b[2];
-    m(0, 2) -= c * b[1];
-    m(2, 0) += c * b[1];
-    m(1, 2) += c * b[0];
-    m(2, 1) -= c * b[0];
-    return m;
-  }
-
-  Vector3<Scalar> x_;
-  Scalar c1_, c2_, c3_, c4_;
 };
+
+// A matrix of three by three, a packet a column: products stay in registers.
+template <typename Scalar>
+using Block = std::array<Packet<Scalar>, 3>;
 
 template <typename Scalar>
 class SO3 {
@@ -165,7 +148,7 @@ class SO3 {
   static Matrix3<Scalar> left_jacobian_inverse(const Tangent& x) {
     const Scalar a2 = x.squaredNorm();
     Scalar c;
-    if (a2 < Gamma<Scalar>::small_angle_squared()) {
+    if (a2 < RotationSeries<Scalar>::small_angle_squared()) {
       c = (1 + a2 / 60 * (1 + a2 / 42)) / 12;
     } else {
       const Scalar a = std::sqrt(a2);
@@ -196,18 +179,20 @@ Matrix3<Scalar> shortest_rotation(const Vector3<Scalar>& from, const Vector3<Sca
 // decomposition, exact to second order in the drift.
 template <typename Scalar>
 Matrix3<Scalar> orthonormalized(const Matrix3<Scalar>& r) {
-  // R (3 I - R'R) / 2
-  const Scalar xy = r.col(0).dot(r.col(1)), xz = r.col(0).dot(r.col(2)),
-               yz = r.col(1).dot(r.col(2));
-  const Scalar xx = 3 - r.col(0).squaredNorm(), yy = 3 - r.col(1).squaredNorm(),
-               zz = 3 - r.col(2).squaredNorm();
-  Matrix3<Scalar> out;
-  for (int i = 0; i < 3; ++i) {
-    const Scalar a = r(i, 0) / 2, b = r(i, 1) / 2, c = r(i, 2) / 2;
-    out(i, 0) = a * xx - b * xy - c * xz;
-    out(i, 1) = b * yy - a * xy - c * yz;
-    out(i, 2) = c * zz - a * xz - b * yz;
-  }
+  // (R + R^-T) / 2 with R^-T the cofactors over their determinant 1 + d, to second order 1 - d.
+  Matrix3<Scalar> cofactors;
+  for (int j = 0; j < 3; ++j) cofactors.col(j) = r.col((j + 1) % 3).cross(r.col((j + 2) % 3));
+  const Scalar inverse = 2 - r.col(0).dot(cofactors.col(0));
+  return (r + inverse * cofactors) / 2;
+}
+template <typename Scalar>
+Block<Scalar> orthonormalized(const Block<Scalar>& r) {
+  using P = Packet<Scalar>;
+  const Block<Scalar> cofactors = {P::cross(r[1], r[2]), P::cross(r[2], r[0]), P::cross(r[0], r[1])};
+  const P volume = r[0] * cofactors[0];
+  const Scalar inverse = 2 - (volume.at(0) + volume.at(1) + volume.at(2));
+  Block<Scalar> out;
+  for (std::size_t j = 0; j < 3; ++j) out[j] = Scalar(0.5) * r[j] + (inverse / 2) * cofactors[j];
   return out;
 }
 

@@ -11,25 +11,30 @@
 namespace tensegrity {
 
 // Columns `to` .. `to + 2` of P get those of `from` times m': P <- P (I + m at rows `to`, columns
-// `from`)'. Rows `first` (a multiple of four) to `end`.
+// `from`)'. Rows `first` to `end` (multiples of four), and with `also` >= 0 the four from there.
 template <typename Derived>
 void add_columns(Eigen::MatrixBase<Derived>& p, int to, int from,
-                 const Matrix3<typename Derived::Scalar>& m, int first, int end) {
+                 const Matrix3<typename Derived::Scalar>& m, int first, int end, int also = -1) {
   using Scalar = typename Derived::Scalar;
   constexpr int kStride = Derived::RowsAtCompileTime;
   Scalar* target = &p.derived().coeffRef(0, to);
   const Scalar* source = &p.derived().coeffRef(0, from);
-  const Matrix3<Scalar> c = m;            // not in memory that the loop may write to
-  for (int i = first; i < end; i += 4) {  // what is loaded is used thrice
-    const Packet<Scalar> a0(source + i), a1(source + i + kStride), a2(source + i + 2 * kStride);
-    for (int k = 0; k < 3; ++k) {
-      Packet<Scalar> x(target + i + k * kStride);
-      x.add(c(k, 0), a0);
-      x.add(c(k, 1), a1);
-      x.add(c(k, 2), a2);
-      x.store(target + i + k * kStride);
-    }
-  }
+  // Numbers by themselves, not in memory that the loop may write to.
+  const Scalar m00 = m(0, 0), m01 = m(0, 1), m02 = m(0, 2);
+  const Scalar m10 = m(1, 0), m11 = m(1, 1), m12 = m(1, 2);
+  const Scalar m20 = m(2, 0), m21 = m(2, 1), m22 = m(2, 2);
+  const auto add = [&](int i) {
+    const Packet<Scalar> a(source + i), b(source + i + kStride), c(source + i + 2 * kStride);
+    Packet<Scalar> x(target + i), y(target + i + kStride), z(target + i + 2 * kStride);
+    x.add(m00, a), y.add(m10, a), z.add(m20, a);
+    x.add(m01, b), y.add(m11, b), z.add(m21, b);
+    x.add(m02, c), y.add(m12, c), z.add(m22, c);
+    x.store(target + i);
+    y.store(target + i + kStride);
+    z.store(target + i + 2 * kStride);
+  };
+  if (also >= 0) add(also);
+  for (int i = first; i < end; i += 4) add(i);
 }
 
 // The same with m = factor I, all rows up to `end`.
@@ -61,14 +66,15 @@ void mirror(Eigen::MatrixBase<Derived>& matrix, int size) {
       for (int r = 0; r < c; ++r) own[c * kStride + r] = own[r * kStride + c];
     }
     for (int i = j + 4; i < size; i += 4) {
-      Packet<Scalar> block[4];
       const Scalar* lower = p + j * kStride + i;
       Scalar* upper = p + i * kStride + j;
-#pragma GCC unroll 4
-      for (int c = 0; c < 4; ++c) block[c] = Packet<Scalar>(lower + c * kStride);
-      Packet<Scalar>::transpose(block);
-#pragma GCC unroll 4
-      for (int c = 0; c < 4; ++c) block[c].store(upper + c * kStride);
+      Packet<Scalar> x0(lower), x1(lower + kStride), x2(lower + 2 * kStride),
+          x3(lower + 3 * kStride);
+      Packet<Scalar>::transpose(x0, x1, x2, x3);
+      x0.store(upper);
+      x1.store(upper + kStride);
+      x2.store(upper + 2 * kStride);
+      x3.store(upper + 3 * kStride);
     }
   }
 }
@@ -87,7 +93,7 @@ class Sum {
 
  private:
   // So many sums at once that none waits for its last addition, and all stay in registers.
-  static constexpr int kMost = Packet<Scalar>::kHeld - 1;
+  static constexpr int kMost = Packet<Scalar>::kHeld;
   static constexpr int kPackets = Rows / 4;
   static constexpr int kGroup = (kPackets + (kPackets - 1) / kMost) / ((kPackets - 1) / kMost + 1);
 
@@ -96,12 +102,12 @@ class Sum {
     constexpr int kHere = std::min(kGroup, kPackets - First);
     Packet<Scalar> sum[kHere];
     for (int k = 0; k < count_; ++k) {
-#pragma GCC unroll 7
+#pragma GCC unroll 12
       for (int i = 0; i < kHere; ++i) {
         sum[i].add(factors_[k], Packet<Scalar>(columns_[k] + 4 * (First + i)));
       }
     }
-#pragma GCC unroll 7
+#pragma GCC unroll 12
     for (int i = 0; i < kHere; ++i) sum[i].store(out + 4 * (First + i));
     if constexpr (First + kHere < kPackets) store_from<First + kHere>(out);
   }
@@ -111,60 +117,113 @@ class Sum {
   int count_ = 0;
 };
 
+// Columns of numbers in memory, `Stride` apart.
+template <typename Scalar, int Stride>
+struct Columns {
+  Scalar* first;
+
+  Columns from(int row) const { return {first + row}; }
+  Columns from_column(int column) const { return {first + column * Stride}; }
+  Scalar* operator[](int column) const { return first + column * Stride; }
+};
+
+// Of a matrix, or of a block of whole columns or rows.
+template <typename Derived>
+auto columns(Eigen::PlainObjectBase<Derived>& m) {
+  return Columns<typename Derived::Scalar, Derived::OuterStrideAtCompileTime>{m.data()};
+}
+template <typename Derived>
+auto columns(const Eigen::MatrixBase<Derived>& m) {
+  return Columns<const typename Derived::Scalar, Derived::OuterStrideAtCompileTime>{
+      m.derived().data()};
+}
+
 namespace detail {
 
-// Four columns of P, `Packets` packets of rows: P <- P +- A B with `count` columns of A and rows of
-// B. What is loaded of A is used in every column, what is loaded of B in every packet, and the tile
+// Four columns of P, `Packets` packets of rows: P <- P +- A B' with `count` > 0 columns of A
+// and B. What is loaded of A is used in every column, what is loaded of B in every packet, and the tile
 // stays in registers.
-template <int Packets, bool Subtract, typename Scalar>
-void add_product_tile(Scalar* p, int p_stride, const Scalar* a, int a_stride, const Scalar* b,
-                      int b_stride, int count) {
+template <int Packets, bool Subtract, typename Scalar, int P, int A, int B>
+void add_product_tile(Columns<Scalar, P> p, Columns<const Scalar, A> a, Columns<const Scalar, B> b,
+                      int count) {
   Packet<Scalar> tile[4][Packets];
 #pragma GCC unroll 4
   for (int c = 0; c < 4; ++c) {
-#pragma GCC unroll 3
-    for (int k = 0; k < Packets; ++k) tile[c][k] = Packet<Scalar>(p + c * p_stride + 4 * k);
+#pragma GCC unroll 2
+    for (int k = 0; k < Packets; ++k) tile[c][k] = Packet<Scalar>(p[c] + 4 * k);
   }
-  for (const Scalar* end = a + count * a_stride; a != end; a += a_stride, b += b_stride) {
+  const Scalar* end = a[count];
+  do {  // with a test at its end alone: the tile would leave its registers at a test before it
     Packet<Scalar> rows[Packets];
-#pragma GCC unroll 3
+#pragma GCC unroll 2
     for (int k = 0; k < Packets; ++k) {
-      rows[k] = Packet<Scalar>(a + 4 * k);
+      rows[k] = Packet<Scalar>(a.first + 4 * k);
       rows[k].hold();
     }
 #pragma GCC unroll 4
     for (int c = 0; c < 4; ++c) {
-#pragma GCC unroll 3
+#pragma GCC unroll 2
       for (int k = 0; k < Packets; ++k) {
         if constexpr (Subtract) {
-          tile[c][k].subtract(b[c], rows[k]);
+          tile[c][k].subtract(b.first[c], rows[k]);
         } else {
-          tile[c][k].add(b[c], rows[k]);
+          tile[c][k].add(b.first[c], rows[k]);
         }
       }
     }
-  }
+    a.first += A;
+    b.first += B;
+  } while (a.first != end);
 #pragma GCC unroll 4
   for (int c = 0; c < 4; ++c) {
-#pragma GCC unroll 3
-    for (int k = 0; k < Packets; ++k) tile[c][k].store(p + c * p_stride + 4 * k);
+#pragma GCC unroll 2
+    for (int k = 0; k < Packets; ++k) tile[c][k].store(p[c] + 4 * k);
   }
 }
 
 }  // namespace detail
 
-// The same for rows `first` to `end` (multiples of four) of P and A.
-template <bool Subtract, typename Scalar>
-void add_product(Scalar* p, int p_stride, const Scalar* a, int a_stride, const Scalar* b,
-                 int b_stride, int count, int first, int end) {
+// Four columns of P from `first` to `end` (multiples of four): P <- P +- A B' with `count` columns
+// (> 0) of A, from the same rows, and of B, of which each has four numbers.
+template <bool Subtract, typename Scalar, int P, int A, int B>
+void add_product(Columns<Scalar, P> p, Columns<const Scalar, A> a, Columns<const Scalar, B> b,
+                 int count, int first, int end) {
   int i = first;
-  if constexpr (Packet<Scalar>::kHeld >= 8 * Packet<Scalar>::kRegisters) {
+  if constexpr (Packet<Scalar>::kHeld >= 12) {
     for (; i + 8 <= end; i += 8) {
-      detail::add_product_tile<2, Subtract>(p + i, p_stride, a + i, a_stride, b, b_stride, count);
+      detail::add_product_tile<2, Subtract>(p.from(i), a.from(i), b, count);
     }
   }
   for (; i < end; i += 4) {
-    detail::add_product_tile<1, Subtract>(p + i, p_stride, a + i, a_stride, b, b_stride, count);
+    detail::add_product_tile<1, Subtract>(p.from(i), a.from(i), b, count);
+  }
+}
+
+// `Packets` packets of rows of P, those from columns 0 to `end`: P <- P + A B' with three columns
+// of A, which stay in registers, and of B.
+template <int Packets, typename Scalar, int P, int A, int B>
+void add_rows(Columns<Scalar, P> p, Columns<const Scalar, A> a, Columns<const Scalar, B> b,
+              int end) {
+  Packet<Scalar> x[Packets], y[Packets], z[Packets];
+#pragma GCC unroll 3
+  for (int k = 0; k < Packets; ++k) {
+    x[k] = Packet<Scalar>(a[0] + 4 * k);
+    y[k] = Packet<Scalar>(a[1] + 4 * k);
+    z[k] = Packet<Scalar>(a[2] + 4 * k);
+  }
+  const Scalar *bx = b[0], *by = b[1], *bz = b[2];
+  for (int j = 0; j < end; ++j, p.first += P) {
+    Packet<Scalar> rows[Packets];
+#pragma GCC unroll 3
+    for (int k = 0; k < Packets; ++k) rows[k] = Packet<Scalar>(p.first + 4 * k);
+#pragma GCC unroll 3
+    for (int k = 0; k < Packets; ++k) rows[k].add(bx[j], x[k]);
+#pragma GCC unroll 3
+    for (int k = 0; k < Packets; ++k) rows[k].add(by[j], y[k]);
+#pragma GCC unroll 3
+    for (int k = 0; k < Packets; ++k) rows[k].add(bz[j], z[k]);
+#pragma GCC unroll 3
+    for (int k = 0; k < Packets; ++k) rows[k].store(p.first + 4 * k);
   }
 }
 
@@ -172,11 +231,10 @@ void add_product(Scalar* p, int p_stride, const Scalar* a, int a_stride, const S
 template <typename P, typename W>
 void subtract_outer(Eigen::MatrixBase<P>& p, const Eigen::MatrixBase<W>& w, int count, int size) {
   static_assert(P::RowsAtCompileTime % 4 == 0 && W::RowsAtCompileTime % 4 == 0, "whole packets");
-  constexpr int kRows = W::RowsAtCompileTime, kStride = P::RowsAtCompileTime;
-  auto* to = &p.derived().coeffRef(0, 0);
-  const auto* from = &w.derived().coeffRef(0, 0);
-  for (int j = 0; j < size; j += 4) {
-    add_product<true>(to + j * kStride, kStride, from, kRows, from + j, kRows, count, j, size);
+  const auto to = columns(p.derived());
+  const auto from = columns(w);
+  for (int j = 0; count > 0 && j < size; j += 4) {
+    add_product<true>(to.from_column(j), from, from.from(j), count, j, size);
   }
   mirror(p, size);
 }

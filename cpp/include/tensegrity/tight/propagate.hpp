@@ -39,7 +39,8 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   for (int c = 2; c < B::kColumns; ++c) {
     const int at = B::column_index(c);
     if (at < B::kRates) add_columns(p, at, B::kRates + (at - B::kEndcaps), dt, B::Dim);
-    transition.group_columns(p, at, body.column_by_gyro(x.col(c)), B::Dim);
+    transition.group_columns(p, at, body.column_by_gyro(Packet<Scalar>(x.col(c))), packet_start(at),
+                             B::Dim);
   }
   transition.body_columns(p, B::Dim);
 
@@ -47,9 +48,7 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   for (int j = 0; j < B::kRates; ++j) {
     p.col(j).template segment<12>(B::kEndcaps) += dt * p.col(j).template segment<12>(B::kRates);
   }
-  for (int j = 0; j < B::kOffsets; j += 4) {
-    transition.rows_of(p, j, B::kEndcaps, padded(B::kOffsets));
-  }
+  transition.all_rows(p, packet_start(B::kEndcaps), padded(B::kOffsets));
 
   // ---- walks of the step
   const auto walk = [&](int at, int size, Scalar std) {
