@@ -125,13 +125,15 @@ class Page:
                     self.instructions(f"{case}/double"),
                     self.least(f"{case}/float"),
                 ]
+            row.insert(4, self.least(f"filter/roll/{contacts}/double"))
             rows.append(row)
-        rows.append(["T", duration(T_PROPAGATION), "", "", duration(T_CORRECTION), "", ""])
+        rows.append(["T", duration(T_PROPAGATION), "", "", "", duration(T_CORRECTION), "", ""])
         header = [
             "contacts",
             "propagate",
             "instructions",
             "`float`",
+            "rolling",
             "correct",
             "instructions",
             "`float`",

@@ -38,7 +38,8 @@ inekf::Kinematics<double, 6, 1> spun_kinematics(const Numbers<6, 3>& h,
   for (int i = 0; i < 6; ++i) {
     k.h_extra.middleRows<3>(3 * i) = V3::UnitZ().cross(V3(k.h.col(i)));
   }
-  k.covariance = (*covariance).transpose();  // symmetric: the same, in the order of memory
+  k.correlated = true;
+  k.shape_covariance = (*covariance).transpose();  // symmetric: the same, in the order of memory
   return k;
 }
 

@@ -1,4 +1,5 @@
-// The loosely coupled filter: one IMU sample and one correction, by the number of contacts.
+// The loosely coupled filter: one IMU sample, with contact points that stand still (T) and with
+// ones that roll, and one correction, by the number of contacts.
 //
 // Every 256th call starts again from the same settled state, so that nothing drifts away; the copy
 // adds about a nanosecond to the mean of a call.
@@ -26,19 +27,17 @@ struct Rig {
   inekf::Kinematics<Scalar, 6, 1> kinematics;
   inekf::ImuSample<Scalar> imu;
   PrismConfig<Scalar> config;
-  Scalar radius;  // of an endcap [m]
+  inekf::Rolling<Scalar> rolling;
   int calls = 0;
 
-  explicit Rig(int contacts) {
+  Rig(int contacts, ContactPoint point) {
     const Prism<Scalar> robot;
-    radius = robot.endcap_radius;
+    if (point == ContactPoint::kRolling) rolling.radius = robot.endcap_radius;
     kinematics.h = robot.undeformed();
     for (int i = 0; i < 6; ++i) {
       kinematics.h_extra.template middleRows<3>(3 * i) = V3::UnitZ().cross(kinematics.h.col(i));
     }
-    kinematics.covariance.setZero();
-    kinematics.covariance.diagonal().setConstant(config.contact_position_std *
-                                                 config.contact_position_std);
+    kinematics.variance = config.contact_position_std * config.contact_position_std;
     belief.rotation = SO3<Scalar>::Exp(V3(Scalar(0.9), Scalar(-0.4), Scalar(0.3))).matrix();
     belief.position = V3(Scalar(0.3), Scalar(-0.2), Scalar(0.5));
     auto variance = belief.covariance.diagonal();
@@ -48,7 +47,7 @@ struct Rig {
       const int id = kOrder[std::size_t(i)];
       inekf::augment(belief, id, V3(kinematics.h.col(id)),
                      Matrix<Scalar, 3, 1>(kinematics.h_extra.template middleRows<3>(3 * id)),
-                     Matrix3<Scalar>(kinematics.covariance.template block<3, 3>(3 * id, 3 * id)));
+                     kinematics.covariance(id, id));
     }
     imu.gyro.setZero();
     imu.accel = belief.rotation.transpose() * V3(0, 0, config.gravity);
@@ -63,7 +62,7 @@ struct Rig {
     inekf::propagate(belief, imu, Scalar(0.005), config.gravity,
                      {config.gyroscope_std, config.accelerometer_std, config.gyroscope_bias_walk,
                       config.accelerometer_bias_walk, config.contact_std},
-                     inekf::Rolling<Scalar>{radius}, Vector<Scalar, 1>(config.spin_walk));
+                     rolling, Vector<Scalar, 1>(config.spin_walk));
   }
   void correct() { inekf::correct_contacts(belief, kinematics, Scalar(0)); }
 
@@ -74,20 +73,20 @@ struct Rig {
 
 template <typename Scalar>
 void add_cases(Program& program, const std::string& scalar) {
+  const auto add = [&](const std::string& name, int contacts, ContactPoint point,
+                       void (Rig<Scalar>::*step)()) {
+    program.add("filter/" + name + "/" + std::to_string(contacts) + "/" + scalar, [=] {
+      return [rig = Rig<Scalar>(contacts, point), step]() mutable {
+        rig.restart();
+        (rig.*step)();
+      };
+    });
+  };
   for (int contacts = 0; contacts <= 6; ++contacts) {
-    program.add("filter/propagate/" + std::to_string(contacts) + "/" + scalar, [contacts] {
-      return [rig = Rig<Scalar>(contacts)]() mutable {
-        rig.restart();
-        rig.propagate();
-      };
-    });
+    add("propagate", contacts, ContactPoint::kCentre, &Rig<Scalar>::propagate);
     if (contacts == 0) continue;
-    program.add("filter/correct/" + std::to_string(contacts) + "/" + scalar, [contacts] {
-      return [rig = Rig<Scalar>(contacts)]() mutable {
-        rig.restart();
-        rig.correct();
-      };
-    });
+    add("roll", contacts, ContactPoint::kRolling, &Rig<Scalar>::propagate);
+    add("correct", contacts, ContactPoint::kCentre, &Rig<Scalar>::correct);
   }
 }
 

@@ -19,28 +19,40 @@ Matrix<Scalar, N> positive_definite() {
 
 template <typename Scalar, int N>
 void check_factors(Scalar tolerance) {
+  constexpr int kBelow = 8;
   for (int trial = 0; trial < 50; ++trial) {
     const Matrix<Scalar, N> a = positive_definite<Scalar, N>();
-    Matrix<Scalar, N> lower = a.template triangularView<Eigen::Lower>();
-    lower.template triangularView<Eigen::StrictlyUpper>().setConstant(
-        std::numeric_limits<Scalar>::quiet_NaN());  // never read
-    tensegrity::Ldlt<Scalar, N> ldlt;
-    REQUIRE(ldlt.factor(lower));
-    Matrix<Scalar, N> l = Matrix<Scalar, N>::Identity();
-    for (int i = 0; i < N; ++i) {
-      for (int j = 0; j < i; ++j) l(i, j) = ldlt.l(i, j);
-    }
-    const Vector<Scalar, N> d = ldlt.inverse_diagonal().cwiseInverse();
-    CHECK((l * d.asDiagonal() * l.transpose() - a).norm() < tolerance * a.norm());
     const Vector<Scalar, N> b = Vector<Scalar, N>::Random();
-    CHECK((a * ldlt.solve(b) - b).norm() < 1000 * tolerance * b.norm());
-    CHECK((l * ldlt.forward(b) - b).norm() < 100 * tolerance * b.norm());
+    const Matrix<Scalar, kBelow, N> below = Matrix<Scalar, kBelow, N>::Random();
+    tensegrity::Ldlt<Scalar, N, kBelow> system;
+    system.matrix() = a.template triangularView<Eigen::Lower>();
+    system.matrix().template triangularView<Eigen::StrictlyUpper>().setConstant(
+        std::numeric_limits<Scalar>::quiet_NaN());  // never read
+    system.set_right(b);
+    system.below() = below;
+    REQUIRE(system.factor());
+    const Vector<Scalar, N> inverse = system.inverse_diagonal();
+    Matrix<Scalar, N> l = Matrix<Scalar, N>::Identity();
+    Vector<Scalar, N> y;
+    Matrix<Scalar, kBelow, N> w;
+    for (int j = 0; j < N; ++j) {
+      for (int i = j + 1; i < N; ++i) l(i, j) = system.column(j)[i] * inverse[j];
+      y[j] = system.yd(j);
+      w.col(j) = Eigen::Map<const Eigen::Matrix<Scalar, kBelow, 1>>(system.wd(j));
+    }
+    CHECK((l * inverse.cwiseInverse().asDiagonal() * l.transpose() - a).norm() <
+          tolerance * a.norm());
+    CHECK((l * y - b).norm() < 100 * tolerance * b.norm());
+    CHECK((w * l.transpose() - below).norm() < 100 * tolerance * below.norm());
+    CHECK((a * system.solve() - b).norm() < 1000 * tolerance * b.norm());
+    system.solve_below();
+    CHECK((system.below() * a - below).norm() < 1000 * tolerance * below.norm());
   }
 }
 
 }  // namespace
 
-TEST_CASE("L D L' of small matrices") {
+TEST_CASE("elimination in small matrices, and below them") {
   check_factors<double, 1>(1e-14);
   check_factors<double, 3>(1e-14);
   check_factors<double, 10>(1e-14);
@@ -49,27 +61,38 @@ TEST_CASE("L D L' of small matrices") {
 }
 
 TEST_CASE("a matrix that is not positive definite, or not finite, has no factors") {
-  tensegrity::Ldlt<double, 3> ldlt;
-  Matrix<double, 3> a = positive_definite<double, 3>();
-  a(1, 1) = -1;
-  CHECK_FALSE(ldlt.factor(a));
-  a(1, 1) = 0;
-  CHECK_FALSE(ldlt.factor(a));
-  a(1, 1) = std::numeric_limits<double>::quiet_NaN();
-  CHECK_FALSE(ldlt.factor(a));
-  a(1, 1) = std::numeric_limits<double>::infinity();
-  CHECK_FALSE(ldlt.factor(a));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  const Matrix<double, 3> a = positive_definite<double, 3>();
+  for (const double bad : {-1.0, 0.0, nan, infinity}) {
+    tensegrity::Ldlt<double, 3> system;
+    system.matrix() = a;
+    system.set_right(tensegrity::Vector3<double>::Zero());
+    system.column(1)[1] = bad;
+    CHECK_FALSE(system.factor());
+  }
 }
 
 TEST_CASE_TEMPLATE("packets: loads, sums and transposes", Scalar, double, float) {
   using tensegrity::Packet;
   Matrix<Scalar, 4> m = Matrix<Scalar, 4>::Random();
-  Packet<Scalar> columns[4];
-  for (int c = 0; c < 4; ++c) columns[c] = Packet<Scalar>(&m(0, c));
-  Packet<Scalar>::transpose(columns);
+  Packet<Scalar> x0(&m(0, 0)), x1(&m(0, 1)), x2(&m(0, 2)), x3(&m(0, 3));
+  Packet<Scalar>::transpose(x0, x1, x2, x3);
   Matrix<Scalar, 4> transposed;
-  for (int c = 0; c < 4; ++c) columns[c].store(&transposed(0, c));
+  x0.store(&transposed(0, 0));
+  x1.store(&transposed(0, 1));
+  x2.store(&transposed(0, 2));
+  x3.store(&transposed(0, 3));
   CHECK(transposed == m.transpose());
+  for (int row = 0; row < 4; ++row) CHECK(x1.at(row) == m(1, row));
+
+  using V3 = tensegrity::Vector3<Scalar>;
+  const V3 a = V3::Random(), b = V3::Random();
+  V3 across;
+  const auto cross = Packet<Scalar>::cross(Packet<Scalar>(a), Packet<Scalar>(b));
+  cross.store_vector(across);
+  CHECK((across - a.cross(b)).norm() < 4 * std::numeric_limits<Scalar>::epsilon());
+  CHECK(cross.at(3) == 0);
 
   Packet<Scalar> sum(m(0, 0), m(1, 0), m(2, 0), m(3, 0));
   sum.add(Scalar(2), Packet<Scalar>(&m(0, 1)));
@@ -110,6 +133,19 @@ TEST_CASE("columns, outer products and mirrors of part of a covariance") {
     P expected = p;
     expected.middleCols<3>(0) += p.middleCols<3>(9) * m.transpose();
     CHECK((columns - expected).norm() < 1e-14);
+
+    columns = p;
+    tensegrity::add_columns(columns, 0, 9, m, 8, size, 0);
+    expected.middleRows<4>(4) = p.middleRows<4>(4);
+    CHECK((columns - expected).norm() < 1e-14);
+
+    P rows = p;
+    const Matrix<double, 28, 3> a = Matrix<double, 28, 3>::Random(), b = a.reverse();
+    tensegrity::add_rows<2>(tensegrity::columns(rows).from(4), tensegrity::columns(a).from(4),
+                            tensegrity::columns(b), 16);
+    expected = p;
+    expected.block<8, 16>(4, 0) += a.middleRows<8>(4) * b.topRows<16>().transpose();
+    CHECK((rows - expected).norm() < 1e-14);
 
     columns = p;
     tensegrity::add_columns(columns, 3, 9, 0.7, size);

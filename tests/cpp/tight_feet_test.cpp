@@ -21,7 +21,7 @@ constexpr double kTolerance = 20 * kDerivativeError;  // norms of vectors of som
 
 VectorXd dense(const Row<double>& row) {
   VectorXd h(B::Dim);
-  for (int k = 0; k < B::Dim; ++k) h[k] = row.times(VectorXd::Unit(B::Dim, k));
+  for (int k = 0; k < B::Dim; ++k) h[k] = row.times(VectorXd(VectorXd::Unit(B::Dim, k)).data());
   return h;
 }
 

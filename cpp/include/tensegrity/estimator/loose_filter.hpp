@@ -149,7 +149,7 @@ class LooseFilter {
   }
 
   void describe_shape_covariance(PrismState<Scalar>& s) const {
-    s.endcap_covariance = kinematics().covariance;
+    s.endcap_covariance = kinematics().joint_covariance();
     s.spin_variance = belief_.covariance(Belief::kExtra, Belief::kExtra);
   }
 
@@ -187,12 +187,13 @@ class LooseFilter {
     const V3 g(0, 0, -config_.gravity);
     const Matrix3<Scalar> gx = hat(g);
     inekf::Innovation<Belief, 3> z;
-    z.residual = belief_.rotation * force + g;
-    z.cross = p.template middleCols<3>(Belief::kRotation) * gx.transpose() -
-              p.template middleCols<3>(Belief::kAccelBias) * belief_.rotation.transpose();
-    z.covariance = gx * z.cross.template middleRows<3>(Belief::kRotation) -
-                   belief_.rotation * z.cross.template middleRows<3>(Belief::kAccelBias);
-    z.covariance.diagonal().array() +=
+    z.set_residual(belief_.rotation * force + g);
+    auto cross = z.cross();
+    cross = p.template middleCols<3>(Belief::kRotation) * gx.transpose() -
+            p.template middleCols<3>(Belief::kAccelBias) * belief_.rotation.transpose();
+    z.covariance() = gx * cross.template middleRows<3>(Belief::kRotation) -
+                     belief_.rotation * cross.template middleRows<3>(Belief::kAccelBias);
+    z.covariance().diagonal().array() +=
         config_.accelerometer_std * config_.accelerometer_std / Scalar(rest.samples);
     inekf::correct(belief_, z, Scalar(0));
   }
@@ -238,20 +239,19 @@ class LooseFilter {
     for (int i = 0; i < 6; ++i) {
       k.h_extra.template middleRows<3>(3 * i) = V3::UnitZ().cross(k.h.col(i));
     }
-    const Scalar floor = config_.contact_position_std * config_.contact_position_std;
-    k.covariance.setZero();
-    if (config_.contact_noise == ContactNoise::kFromShape &&
-        config_.shape == ShapeMethod::kTracker) {
-      const Matrix3<Scalar> spin = SO3<Scalar>::Exp(V3(0, 0, phi)).matrix();
-      const Matrix<Scalar, 18>& q = tracker_.covariance();
-      for (int i = 2; i < 6; ++i) {  // endcaps 0 and 1 are exact in the body frame
-        for (int j = 2; j < 6; ++j) {
-          k.covariance.template block<3, 3>(3 * i, 3 * j) =
-              spin * q.template block<3, 3>(3 * i, 3 * j) * spin.transpose();
-        }
+    k.variance = config_.contact_position_std * config_.contact_position_std;
+    k.correlated =
+        config_.contact_noise == ContactNoise::kFromShape && config_.shape == ShapeMethod::kTracker;
+    if (!k.correlated) return k;
+    k.shape_covariance.setZero();  // endcaps 0 and 1 are exact in the body frame
+    const Matrix3<Scalar> spin = SO3<Scalar>::Exp(V3(0, 0, phi)).matrix();
+    const Matrix<Scalar, 18>& q = tracker_.covariance();
+    for (int i = 2; i < 6; ++i) {
+      for (int j = 2; j < 6; ++j) {
+        k.shape_covariance.template block<3, 3>(3 * i, 3 * j) =
+            spin * q.template block<3, 3>(3 * i, 3 * j) * spin.transpose();
       }
     }
-    k.covariance.diagonal().array() += floor;
     return k;
   }
 
@@ -315,7 +315,7 @@ class LooseFilter {
       if (is_new(id)) {
         inekf::augment(belief_, id, V3(k.h.col(id)),
                        Matrix<Scalar, 3, 1>(k.h_extra.template middleRows<3>(3 * id)),
-                       Matrix3<Scalar>(k.covariance.template block<3, 3>(3 * id, 3 * id)));
+                       k.covariance(id, id));
       }
     }
   }

@@ -29,6 +29,13 @@ struct Kinematics {
     if (i == j) m.diagonal().array() += variance;
     return m;
   }
+  // Of all endcaps [m^2].
+  Matrix<Scalar, 3 * N> joint_covariance() const {
+    Matrix<Scalar, 3 * N> m = Matrix<Scalar, 3 * N>::Zero();
+    if (correlated) m = shape_covariance;
+    m.diagonal().array() += variance;
+    return m;
+  }
 };
 
 // All anchored endcaps in one measurement: their errors are correlated through the shape.

@@ -20,7 +20,7 @@ struct Innovation {
   System system;
 
   void set_residual(const Vector<Scalar, Rows>& z) { system.set_right(z); }
-  auto cross() { return system.below(); }         // P H'
+  auto cross() { return system.below(); }        // P H'
   auto covariance() { return system.matrix(); }  // S = H P H' + N, lower triangle
 };
 

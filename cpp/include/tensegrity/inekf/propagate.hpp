@@ -54,8 +54,8 @@ void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravit
   for (int i = 0; i < anchors; ++i) {
     const int at = B::anchor_index(i);
     if (rolls) belief.anchors.col(i) += rolling.radius * turn.cross(up);
-    const Block<Scalar> by_gyro = body.column_by_gyro(
-        Packet<Scalar>(V3(belief.anchors.col(i) - rolling.radius * up)));
+    const Block<Scalar> by_gyro =
+        body.column_by_gyro(Packet<Scalar>(V3(belief.anchors.col(i) - rolling.radius * up)));
     if (rolls) add_columns(p, at, B::kRotation, anchor_by_rotation, 0, rows);
     transition.group_columns(p, at, by_gyro, rolls ? 0 : packet_start(at), rows);
   }

@@ -9,9 +9,10 @@
 //   [ B  ]        [ W  ]
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
-#include "tensegrity/math/packet.hpp"
+#include "tensegrity/math/symmetric.hpp"
 #include "tensegrity/types.hpp"
 
 namespace tensegrity {
@@ -22,10 +23,12 @@ class Ldlt {
   // Where a column holds b and B. B has `Below` rows, a multiple of four.
   static constexpr int kRight = N;
   static constexpr int kBelow = padded(N + 1);
+  static constexpr int kRows = kBelow + Below;
 
-  // To be filled before `factor`: of A the lower triangle, b if `solve` or `y` is to be called. What
-  // is above the diagonal does not matter.
+  // To be filled before `factor`: of A the lower triangle, b if `solve` or `y` is to be called.
+  // What is above the diagonal does not matter.
   Scalar* column(int j) { return &columns_(0, j); }
+  Columns<Scalar, kRows> columns() { return {column(0)}; }
   auto matrix() { return columns_.template topRows<N>(); }
   auto below() { return columns_.template bottomRows<Below>(); }
   void set_right(const Vector<Scalar, N>& b) {
@@ -75,39 +78,43 @@ class Ldlt {
 
  private:
   static_assert(Below % 4 == 0, "whole packets");
-  static constexpr int kRows = kBelow + Below;
 
-  // Four columns from `First` on, and those after them.
-  template <int First>
+  // Column j, and those after it.
+  template <int J>
   bool factor_from() {
-    for (int j = First; j < std::min(First + 4, N); ++j) {
-      reduce<First / 4>(j);
-      const Scalar pivot = columns_(j, j);
-      if (!(pivot > 0) || !std::isfinite(pivot)) return false;
-      inverse_[j] = 1 / pivot;
-    }
-    if constexpr (First + 4 < N) return factor_from<First + 4>();
+    const Scalar pivot = reduce<J / 4, J>();
+    if (!(pivot > 0) || !std::isfinite(pivot)) return false;
+    inverse_[J] = 1 / pivot;
+    if constexpr (J + 1 < N) return factor_from<J + 1>();
     return true;
   }
 
-  // Column j less what the columns before it hold of it, from packet `From` on. The chain from pivot
-  // to pivot is what takes the time; all that is below fits into its pauses.
-  template <int From>
-  void reduce(int j) {
+  // Column J less what the columns before it hold of it, from packet `From` on; returns its pivot.
+  // The chain from pivot to pivot is what takes the time; all that is below fits into its pauses.
+  template <int From, int J>
+  Scalar reduce() {
     constexpr int kHere = std::min(kRows / 4 - From, Packet<Scalar>::kHeld);
-    Scalar* column = &columns_(4 * From, j);
+    Scalar* column = &columns_(4 * From, J);
     Packet<Scalar> rest[kHere];
 #pragma GCC unroll 12
     for (int i = 0; i < kHere; ++i) rest[i] = Packet<Scalar>(column + 4 * i);
-    for (int k = 0; k < j; ++k) {
-      const Scalar factor = columns_(j, k) * inverse_[k];
+    const auto take = [&](int k) {
+      const Scalar factor = columns_(J, k) * inverse_[k];
       const Scalar* before = &columns_(4 * From, k);
 #pragma GCC unroll 12
       for (int i = 0; i < kHere; ++i) rest[i].subtract(factor, Packet<Scalar>(before + 4 * i));
+    };
+    if constexpr (kRows <= 12) {
+#pragma GCC unroll 12
+      for (int k = 0; k < J; ++k) take(k);
+    } else {
+#pragma GCC unroll 1
+      for (int k = 0; k < J; ++k) take(k);
     }
 #pragma GCC unroll 12
     for (int i = 0; i < kHere; ++i) rest[i].store(column + 4 * i);
-    if constexpr (From + kHere < kRows / 4) reduce<From + kHere>(j);
+    if constexpr (From + kHere < kRows / 4) reduce<From + kHere, J>();
+    return rest[0].at(J % 4);
   }
 
   Matrix<Scalar, kRows, N> columns_;

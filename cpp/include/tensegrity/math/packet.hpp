@@ -22,8 +22,7 @@ template <typename Scalar, bool Simd, int Bytes>
 struct Register {
   typedef Scalar Type __attribute__((vector_size(Bytes)));
   // The same anywhere in an array of numbers.
-  typedef Scalar Unaligned
-      __attribute__((vector_size(Bytes), aligned(alignof(Scalar)), may_alias));
+  typedef Scalar Unaligned __attribute__((vector_size(Bytes), aligned(alignof(Scalar)), may_alias));
   static Type load(const Scalar* at) { return *reinterpret_cast<const Unaligned*>(at); }
   static void store(Scalar* at, const Type& x) { *reinterpret_cast<Unaligned*>(at) = x; }
 };

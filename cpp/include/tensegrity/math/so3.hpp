@@ -188,7 +188,8 @@ Matrix3<Scalar> orthonormalized(const Matrix3<Scalar>& r) {
 template <typename Scalar>
 Block<Scalar> orthonormalized(const Block<Scalar>& r) {
   using P = Packet<Scalar>;
-  const Block<Scalar> cofactors = {P::cross(r[1], r[2]), P::cross(r[2], r[0]), P::cross(r[0], r[1])};
+  const Block<Scalar> cofactors = {P::cross(r[1], r[2]), P::cross(r[2], r[0]),
+                                   P::cross(r[0], r[1])};
   const P volume = r[0] * cofactors[0];
   const Scalar inverse = 2 - (volume.at(0) + volume.at(1) + volume.at(2));
   Block<Scalar> out;

@@ -141,8 +141,8 @@ auto columns(const Eigen::MatrixBase<Derived>& m) {
 namespace detail {
 
 // Four columns of P, `Packets` packets of rows: P <- P +- A B' with `count` > 0 columns of A
-// and B. What is loaded of A is used in every column, what is loaded of B in every packet, and the tile
-// stays in registers.
+// and B. What is loaded of A is used in every column, what is loaded of B in every packet, and the
+// tile stays in registers.
 template <int Packets, bool Subtract, typename Scalar, int P, int A, int B>
 void add_product_tile(Columns<Scalar, P> p, Columns<const Scalar, A> a, Columns<const Scalar, B> b,
                       int count) {

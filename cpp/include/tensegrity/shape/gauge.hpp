@@ -74,18 +74,26 @@ Matrix<Scalar, 18> to_procrustes_gauge(const Matrix<Scalar, 18>& covariance,
   return out;
 }
 
-// Unit tangent of the spin about z, the exact null vector of the length Jacobian. Zero when both
-// rods lie on z, where there is no spin.
+// Tangent of the spin about z per radian [m/rad], the exact null vector of the length Jacobian.
 template <typename Scalar>
-Tangent<Scalar> spin_tangent(const Rods<Scalar>& rods) {
+Tangent<Scalar> spin_by_angle(const Rods<Scalar>& rods) {
   Tangent<Scalar> tangent;
-  const Vector3<Scalar> z = Vector3<Scalar>::UnitZ();
   for (int k = 0; k < 2; ++k) {
     const auto& rod = rods.rod(k);
-    tangent.template segment<3>(5 * k) = z.cross(rod.centre);
-    tangent.template segment<2>(5 * k + 3) =
-        rods.half_length() * (rod.across().transpose() * z.cross(rod.direction()));
+    // z x c, and of L/2 z x u what is across: a . (z x u) = b_z, b . (z x u) = -a_z.
+    tangent[5 * k] = -rod.centre.y();
+    tangent[5 * k + 1] = rod.centre.x();
+    tangent[5 * k + 2] = 0;
+    tangent[5 * k + 3] = rods.half_length() * rod.frame(2, 1);
+    tangent[5 * k + 4] = -rods.half_length() * rod.frame(2, 0);
   }
+  return tangent;
+}
+
+// The same of unit length. Zero when both rods lie on z, where there is no spin.
+template <typename Scalar>
+Tangent<Scalar> spin_tangent(const Rods<Scalar>& rods) {
+  const Tangent<Scalar> tangent = spin_by_angle(rods);
   const Scalar norm = tangent.norm();
   return norm > 0 ? Tangent<Scalar>(tangent / norm) : Tangent<Scalar>::Zero();
 }

@@ -7,6 +7,7 @@
 
 #include <array>
 
+#include "tensegrity/math/symmetric.hpp"
 #include "tensegrity/shape/gauge.hpp"
 
 namespace tensegrity::shape {
@@ -17,16 +18,21 @@ class LengthResiduals {
   // `measured`: order of `kPrismCables` [m].
   LengthResiduals(const Rods<Scalar>& rods, const CableLengths<Scalar>& measured) {
     const Endcaps<Scalar> q = rods.endcaps();
-    Lanes measured_lanes = Lanes::Ones();
     for (int i = 0; i < 3; ++i) {
-      directions_[std::size_t(i)].setOnes();  // lanes without a cable
-#pragma GCC unroll 9
-      for (int k = 0; k < 9; ++k) {
+      // A packet at a time: numbers that are stored one by one cannot be read as packets at once.
+      const auto span = [&](int k) {
         const Cable cable = kPrismCables[std::size_t(k)];
-        directions_[std::size_t(i)][k] = q(i, cable.from) - q(i, cable.to);
-      }
+        return q(i, cable.from) - q(i, cable.to);
+      };
+      Scalar* out = &directions_[std::size_t(i)][0];
+      Packet<Scalar>(span(0), span(1), span(2), span(3)).store(out);
+      Packet<Scalar>(span(4), span(5), span(6), span(7)).store(out + 4);
+      Packet<Scalar>(span(8), Scalar(1), Scalar(1), Scalar(1)).store(out + 8);  // no cable
     }
-    measured_lanes.template head<9>() = measured.array();
+    Lanes measured_lanes;
+    Packet<Scalar>(&measured[0]).store(&measured_lanes[0]);
+    Packet<Scalar>(&measured[4]).store(&measured_lanes[4]);
+    Packet<Scalar>(measured[8], Scalar(1), Scalar(1), Scalar(1)).store(&measured_lanes[8]);
     auto& [x, y, z] = directions_;
     const Lanes lengths = (x * x + y * y + z * z).sqrt();
     // A cable of no length has no direction.
@@ -35,7 +41,7 @@ class LengthResiduals {
     y *= inverse_lengths_;
     z *= inverse_lengths_;
     residuals_ = lengths - measured_lanes;
-    residuals_.template tail<kLanes - 9>().setZero();
+    Packet<Scalar>(residuals_[8], Scalar(0), Scalar(0), Scalar(0)).store(&residuals_[8]);
   }
 
   // Sum of squared residuals [m^2].
@@ -69,8 +75,10 @@ class LengthResiduals {
   }
 
   // J' J, and with `second_order` the second derivatives of the lengths times the residuals as
-  // well. The lower triangle; a unit stiffness holds the spin about z.
-  TangentMatrix<Scalar> hessian(const Rods<Scalar>& rods, bool second_order) const {
+  // well, to the lower triangle of `h`. The spin about z, which no length holds,
+  // gets the stiffness t t' / L^2 with t = spin_by_angle.
+  template <int Stride>
+  void hessian(const Rods<Scalar>& rods, bool second_order, Columns<Scalar, Stride> h) const {
     // A cable resists along itself, and as it is tense also across.
     // (A structured binding would not do: in C++17 no lambda may capture it.)
     const Lanes &x = directions_[0], &y = directions_[1], &z = directions_[2];
@@ -80,80 +88,84 @@ class LengthResiduals {
     const std::array<Lanes, 6> stiffness{
         {wx * x + tension, wx * y, wx * z, wy * y + tension, wy * z, wz * z + tension}};
 
-    Ends own{};                        // stiffness at endcaps 2 .. 5
-    std::array<Symmetric, 4> cross{};  // between the rods: by no side, rod 0's, 1's, both
-    std::array<Scalar, 2> circles{};   // endcaps move on circles about their rod's centre
-    // Unrolled, so that which endcaps a cable joins is known to the compiler.
-#pragma GCC unroll 9
-    for (int k = 0; k < 9; ++k) {
-      const Cable cable = kPrismCables[std::size_t(k)];
-      const int from = free_rod(cable.from), to = free_rod(cable.to);
-#pragma GCC unroll 6
-      for (std::size_t i = 0; i < 6; ++i) {
-        const Scalar value = stiffness[i][k];
-        if (from >= 0) own[std::size_t(cable.from - 2)][i] += value;
-        if (to >= 0) own[std::size_t(cable.to - 2)][i] += value;
+    const auto of = [&](int k) {
+      const auto i = std::size_t(k);
+      return Symmetric{stiffness[0][i], stiffness[1][i], stiffness[2][i],
+                       stiffness[3][i], stiffness[4][i], stiffness[5][i]};
+    };
+    Ends own;                         // stiffness at endcaps 2 .. 5
+    std::array<Symmetric, 4> cross;   // between the rods: by no side, rod 0's, 1's, both
+    std::array<Scalar, 2> circles{};  // endcaps move on circles about their rod's centre
+    // Unrolled, so that which cables an endcap holds is known to the compiler.
+#pragma GCC unroll 4
+    for (int e = 0; e < 4; ++e) {
+      const auto& held = kHeldBy[std::size_t(e)];
+      own[std::size_t(e)] = sum(sum(of(held[0]), of(held[1])), of(held[2]));
+      if (!second_order) continue;
+      const int rod = e / 2;
+      const auto u = rods.rod(rod).direction();
+#pragma GCC unroll 3
+      for (int k : held) {
+        const int sign = kPrismCables[std::size_t(k)].from == e + 2 ? 1 : -1;
+        circles[std::size_t(rod)] -=
+            Scalar(sign * rod_side(e)) * residuals_[k] * (x[k] * u[0] + y[k] * u[1] + z[k] * u[2]);
       }
-      if (second_order) {
-        const auto pull_inward = [&](int endcap, int rod, int sign) {
-          const auto u = rods.rod(rod).direction();
-          circles[std::size_t(rod)] -= Scalar(sign * rod_side(endcap)) * residuals_[k] *
-                                       (x[k] * u[0] + y[k] * u[1] + z[k] * u[2]);
-        };
-        if (from >= 0) pull_inward(cable.from, from, 1);
-        if (to >= 0) pull_inward(cable.to, to, -1);
-      }
-      if (from < 0 || to < 0) continue;
-      const Scalar side_0 = Scalar(rod_side(from == 0 ? cable.from : cable.to));
-      const Scalar side_1 = Scalar(rod_side(from == 0 ? cable.to : cable.from));
-#pragma GCC unroll 6
+    }
+    {  // from rod 0's even end to the even end of rod 1, odd to odd, even to odd
+      const Symmetric ee = of(kBetween[0]), oo = of(kBetween[1]), eo = of(kBetween[2]);
       for (std::size_t i = 0; i < 6; ++i) {
-        const Scalar value = stiffness[i][k];
-        cross[0][i] -= value;
-        cross[1][i] -= side_0 * value;
-        cross[2][i] -= side_1 * value;
-        cross[3][i] -= side_0 * side_1 * value;
+        cross[0][i] = -ee[i] - oo[i] - eo[i];
+        cross[1][i] = -ee[i] + oo[i] - eo[i];
+        cross[2][i] = -ee[i] + oo[i] + eo[i];
+        cross[3][i] = -ee[i] - oo[i] + eo[i];
       }
     }
 
-    TangentMatrix<Scalar> h;
+    const Tangent<Scalar> spin = spin_by_angle(rods);
+    const Scalar stiffness_of_spin = 1 / (4 * rods.half_length() * rods.half_length());
+    const auto set = [&](int row, int column, Scalar value) {
+      h[column][row] = value + stiffness_of_spin * spin[row] * spin[column];
+    };
+    const auto set_block = [&](int row, int column, const Symmetric& m) {
+      set(row, column, m[0]), set(row + 1, column, m[1]), set(row + 2, column, m[2]);
+      set(row, column + 1, m[1]), set(row + 1, column + 1, m[3]), set(row + 2, column + 1, m[4]);
+      set(row, column + 2, m[2]), set(row + 1, column + 2, m[4]), set(row + 2, column + 2, m[5]);
+    };
+    const auto set_column = [&](int row, int column, const Vector3<Scalar>& v) {
+      for (int i = 0; i < 3; ++i) set(row + i, column, v[i]);
+    };
+    const auto set_row = [&](int row, int column, const Vector3<Scalar>& v) {
+      for (int i = 0; i < 3; ++i) set(row, column + i, v[i]);
+    };
     for (int rod = 0; rod < 2; ++rod) {
       const int at = 5 * rod;
       const Symmetric& even = own[std::size_t(2 * rod)];
       const Symmetric& odd = own[std::size_t(2 * rod + 1)];
-      Symmetric sum, difference;
-      for (std::size_t i = 0; i < 6; ++i) {
-        sum[i] = even[i] + odd[i];
-        difference[i] = even[i] - odd[i];
-      }
+      const Symmetric both = sum(even, odd);
+      Symmetric difference;
+      for (std::size_t i = 0; i < 6; ++i) difference[i] = even[i] - odd[i];
       const Vector3<Scalar> a = rods.rod(rod).frame.col(0), b = rods.rod(rod).frame.col(1);
-      const Vector3<Scalar> sum_a = times(sum, a), sum_b = times(sum, b);
+      const Vector3<Scalar> both_a = times(both, a), both_b = times(both, b);
       const Scalar circle = circles[std::size_t(rod)] / rods.half_length();
-      set_block(h, at, at, sum);
-      set_row(h, at + 3, at, times(difference, a));
-      set_row(h, at + 4, at, times(difference, b));
-      h(at + 3, at + 3) = a.dot(sum_a) + circle;
-      h(at + 4, at + 3) = b.dot(sum_a);
-      h(at + 4, at + 4) = b.dot(sum_b) + circle;
+      set_block(at, at, both);
+      set_row(at + 3, at, times(difference, a));
+      set_row(at + 4, at, times(difference, b));
+      set(at + 3, at + 3, dot(a, both_a) + circle);
+      set(at + 4, at + 3, dot(b, both_a));
+      set(at + 4, at + 4, dot(b, both_b) + circle);
     }
     const Vector3<Scalar> a0 = rods.rod(0).frame.col(0), b0 = rods.rod(0).frame.col(1);
     const Vector3<Scalar> a1 = rods.rod(1).frame.col(0), b1 = rods.rod(1).frame.col(1);
-    set_block(h, 5, 0, cross[0]);
-    h.template block<3, 1>(5, 3) = times(cross[1], a0);
-    h.template block<3, 1>(5, 4) = times(cross[1], b0);
-    set_row(h, 8, 0, times(cross[2], a1));
-    set_row(h, 9, 0, times(cross[2], b1));
+    set_block(5, 0, cross[0]);
+    set_column(5, 3, times(cross[1], a0));
+    set_column(5, 4, times(cross[1], b0));
+    set_row(8, 0, times(cross[2], a1));
+    set_row(9, 0, times(cross[2], b1));
     const Vector3<Scalar> both_a = times(cross[3], a0), both_b = times(cross[3], b0);
-    h(8, 3) = a1.dot(both_a);
-    h(8, 4) = a1.dot(both_b);
-    h(9, 3) = b1.dot(both_a);
-    h(9, 4) = b1.dot(both_b);
-
-    const Tangent<Scalar> spin = spin_tangent(rods);
-    for (int j = 0; j < kTangent; ++j) {
-      for (int i = j; i < kTangent; ++i) h(i, j) += spin[i] * spin[j];
-    }
-    return h;
+    set(8, 3, dot(a1, both_a));
+    set(8, 4, dot(a1, both_b));
+    set(9, 3, dot(b1, both_a));
+    set(9, 4, dot(b1, both_b));
   }
 
  private:
@@ -164,15 +176,23 @@ class LengthResiduals {
   using Symmetric = std::array<Scalar, 6>;
   using Ends = std::array<Symmetric, 4>;
 
+  // Cables that endcaps 2 .. 5 hold, and those between rods 23 and 45.
+  static constexpr std::array<std::array<int, 3>, 4> kHeldBy = {
+      {{{1, 2, 8}}, {{4, 5, 7}}, {{0, 2, 6}}, {{3, 5, 8}}}};
+  static constexpr std::array<int, 3> kBetween = {2, 5, 8};
+
   static Vector3<Scalar> times(const Symmetric& m, const Vector3<Scalar>& v) {
     return {m[0] * v[0] + m[1] * v[1] + m[2] * v[2], m[1] * v[0] + m[3] * v[1] + m[4] * v[2],
             m[2] * v[0] + m[4] * v[1] + m[5] * v[2]};
   }
-  static void set_block(TangentMatrix<Scalar>& h, int row, int column, const Symmetric& m) {
-    h.template block<3, 3>(row, column) << m[0], m[1], m[2], m[1], m[3], m[4], m[2], m[4], m[5];
+  // By components: Eigen's packets of two would wait for what is stored one by one.
+  static Scalar dot(const Vector3<Scalar>& a, const Vector3<Scalar>& b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   }
-  static void set_row(TangentMatrix<Scalar>& h, int row, int column, const Vector3<Scalar>& v) {
-    for (int i = 0; i < 3; ++i) h(row, column + i) = v[i];
+  static Symmetric sum(const Symmetric& a, const Symmetric& b) {
+    Symmetric out;
+    for (std::size_t i = 0; i < 6; ++i) out[i] = a[i] + b[i];
+    return out;
   }
 
   Lanes inverse_lengths_, residuals_;

@@ -14,6 +14,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 
 #include "tensegrity/robot/prism.hpp"
 #include "tensegrity/types.hpp"
@@ -88,10 +89,15 @@ class Rods {
   void retract(const Tangent<Scalar>& delta) {
     for (int k = 0; k < 2; ++k) {
       Rod& rod = rods_[std::size_t(k)];
-      rod.centre += delta.template segment<3>(5 * k);
-      const Vector3<Scalar> u =
-          rod.direction() + rod.across() * delta.template segment<2>(5 * k + 3) / half_length_;
-      set_direction(rod, u.normalized(), rod.frame.col(0));
+      const Scalar a = delta[5 * k + 3] / half_length_, b = delta[5 * k + 4] / half_length_;
+      Vector3<Scalar> u;
+      for (int i = 0; i < 3; ++i) {
+        rod.centre[i] += delta[5 * k + i];
+        u[i] = rod.frame(i, 2) + a * rod.frame(i, 0) + b * rod.frame(i, 1);
+      }
+      const Scalar scale = 1 / std::sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+      for (int i = 0; i < 3; ++i) u[i] *= scale;
+      set_direction(rod, u, rod.frame.col(0));
     }
   }
 
@@ -132,10 +138,14 @@ class Rods {
  private:
   // `hint` is any vector that is not parallel to u; its part across u becomes the first axis.
   static void set_direction(Rod& rod, const Vector3<Scalar>& u, const Vector3<Scalar>& hint) {
-    const Vector3<Scalar> first = (hint - u.dot(hint) * u).normalized();
-    rod.frame.col(0) = first;
-    rod.frame.col(1) = u.cross(first);
-    rod.frame.col(2) = u;
+    // By components: Eigen's packets of two would wait for what is stored one by one.
+    const Scalar along = u[0] * hint[0] + u[1] * hint[1] + u[2] * hint[2];
+    const Scalar x = hint[0] - along * u[0], y = hint[1] - along * u[1], z = hint[2] - along * u[2];
+    const Scalar scale = 1 / std::sqrt(x * x + y * y + z * z);
+    const Vector3<Scalar> first(scale * x, scale * y, scale * z);
+    rod.frame << first[0], u[1] * first[2] - u[2] * first[1], u[0],  //
+        first[1], u[2] * first[0] - u[0] * first[2], u[1],           //
+        first[2], u[0] * first[1] - u[1] * first[0], u[2];
   }
 
   Scalar half_length_;

@@ -133,10 +133,14 @@ class Solver {
     TangentMatrix<Scalar> information =
         jacobian.transpose().lazyProduct(jacobian) / (cable_std * cable_std);
     information.diagonal().array() += 1 / (prior_std * prior_std);
-    Ldlt<Scalar, kTangent> factor;
-    if (!factor.factor(information)) return Status::kOutOfRange;  // beyond the range of Scalar
-    TangentMatrix<Scalar> tangent;
-    for (int k = 0; k < kTangent; ++k) tangent.col(k) = factor.solve(Tangent<Scalar>::Unit(k));
+    constexpr int kRows = padded(kTangent);
+    Ldlt<Scalar, kTangent, kRows> system;
+    system.matrix() = information;
+    system.set_right(Tangent<Scalar>::Zero());
+    system.below().setIdentity();
+    if (!system.factor()) return Status::kOutOfRange;  // beyond the range of Scalar
+    system.solve_below();
+    const TangentMatrix<Scalar> tangent = system.below().template topRows<kTangent>();
     out = to_endcaps(tangent);
     return Status::kOk;
   }
@@ -194,18 +198,18 @@ class Solver {
     Scalar damping = 0;
     while (now.iterations < limit) {
       ++now.iterations;
-      const Tangent<Scalar> gradient = residuals.gradient(now.rods);
-      Ldlt<Scalar, kTangent> factor;
+      Ldlt<Scalar, kTangent> system;
       const auto model = [&](bool second_order) {
-        TangentMatrix<Scalar> hessian = residuals.hessian(now.rods, second_order);
-        hessian.diagonal().array() += damping;
-        return factor.factor(hessian);
+        residuals.hessian(now.rods, second_order, system.columns());
+        for (int k = 0; damping > 0 && k < kTangent; ++k) system.column(k)[k] += damping;
+        system.set_right(residuals.gradient(now.rods));
+        return system.factor();
       };
       if (!model(now.newton)) {  // not a minimum of the second-order model
         damping = std::max(damping, initial_damping);
         model(false);
       }
-      Tangent<Scalar> step = -factor.solve(gradient);
+      Tangent<Scalar> step = -system.solve();
       const Scalar length = step.norm();
       if (!std::isfinite(length)) {
         damping = std::max(10 * damping, initial_damping);

@@ -173,12 +173,15 @@ class Tracker {
     const Scalar variance = cable_std * cable_std;
     // Lazy products: others refer to the heap for operands of more than eight rows and columns.
     const LengthJacobian<Scalar> cross = jacobian.lazyProduct(covariance);
-    Matrix<Scalar, 9> spread = cross.lazyProduct(jacobian.transpose());
-    spread.diagonal().array() += variance;
-    Ldlt<Scalar, 9> factors;
-    if (!factors.factor(spread)) return false;
-    Matrix<Scalar, kTangent, 9> gain;
-    for (int i = 0; i < kTangent; ++i) gain.row(i) = factors.solve(cross.col(i)).transpose();
+    Ldlt<Scalar, 9, padded(kTangent)> system;
+    system.matrix() = cross.lazyProduct(jacobian.transpose());
+    system.matrix().diagonal().array() += variance;
+    system.set_right(Vector<Scalar, 9>::Zero());
+    system.below().setZero();
+    system.below().template topRows<kTangent>() = cross.transpose();
+    if (!system.factor()) return false;
+    system.solve_below();
+    const Matrix<Scalar, kTangent, 9> gain = system.below().template topRows<kTangent>();
     rods.retract(gain * innovation);
     // Joseph's form (I - K J) P (I - K J)' + K R K' stays positive semi-definite under rounding.
     const TangentMatrix<Scalar> keep =

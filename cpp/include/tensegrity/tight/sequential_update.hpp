@@ -11,58 +11,9 @@
 #include <array>
 #include <cmath>
 
-#include "tensegrity/math/symmetric.hpp"
-#include "tensegrity/tight/belief.hpp"
+#include "tensegrity/tight/row.hpp"
 
 namespace tensegrity::tight {
-
-// One row of H, as blocks of three columns and at most one single column.
-template <typename Scalar>
-class Row {
- public:
-  static constexpr int kMaxBlocks = 6;
-  static constexpr int kMost = 3 * kMaxBlocks + 1;  // elements
-
-  void add(int at, const Vector3<Scalar>& h) {
-    for (int k = 0; k < blocks_; ++k) {
-      if (at_[std::size_t(k)] == at) {
-        h_[std::size_t(k)] += h;
-        return;
-      }
-    }
-    at_[std::size_t(blocks_)] = at;
-    h_[std::size_t(blocks_++)] = h;
-  }
-  void add_single(int at, Scalar h) {
-    single_at_ = at;
-    single_ = h;
-  }
-
-  // Calls `use(index, coefficient)` for every element that is not zero.
-  template <typename Use>
-  void for_each(const Use& use) const {
-    if (single_at_ >= 0) use(single_at_, single_);
-    for (int k = 0; k < blocks_; ++k) {
-      for (int i = 0; i < 3; ++i) use(at_[std::size_t(k)] + i, h_[std::size_t(k)][i]);
-    }
-  }
-  // H x
-  template <typename Derived>
-  Scalar times(const Eigen::MatrixBase<Derived>& x) const {
-    Scalar sum = single_at_ >= 0 ? single_ * x[single_at_] : Scalar(0);
-    for (int k = 0; k < blocks_; ++k) {
-      sum += h_[std::size_t(k)].dot(x.template segment<3>(at_[std::size_t(k)]));
-    }
-    return sum;
-  }
-
- private:
-  std::array<int, kMaxBlocks> at_{};
-  std::array<Vector3<Scalar>, kMaxBlocks> h_{};
-  int blocks_ = 0;
-  int single_at_ = -1;
-  Scalar single_ = 0;
-};
 
 // Within the batch every row counts in full, so that the mean is that of the joint update; what a
 // row does not inform of is left out of the downdate at the end.
@@ -94,16 +45,16 @@ class SequentialUpdate {
     if (waiting_ == kCapacity) downdate();
     Sum<Scalar, B::Dim, Row<Scalar>::kMost + kCapacity> cross;
     row.for_each([&](int i, Scalar h) { cross.add(h, &belief_.covariance(0, i)); });
-    Scalar innovation = residual - row.times(error_);
+    Scalar innovation = residual - row.times(&error_[0]);
     for (int k = 0; k < waiting_; ++k) {
       const Waiting& before = rows_[std::size_t(k)];
-      const Scalar seen = row.times(crosses_.col(k));
+      const Scalar seen = row.times(&crosses_(0, k));
       cross.add(-seen * before.inverse_variance, &crosses_(0, k));
       innovation -= seen * before.weight;
     }
     auto c = crosses_.col(waiting_);
     cross.store(&c[0]);
-    const Scalar inverse_variance = 1 / (std::max(row.times(c), Scalar(0)) + variance);
+    const Scalar inverse_variance = 1 / (std::max(row.times(&c[0]), Scalar(0)) + variance);
     const Scalar weight = innovation * inverse_variance;
     const Scalar chi_square = innovation * weight;
     if (!std::isfinite(chi_square) || (gate > 0 && chi_square > gate)) return chi_square;

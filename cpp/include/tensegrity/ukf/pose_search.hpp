@@ -144,9 +144,11 @@ class PoseSearch {
       M6 damped = hessian;
       damped.diagonal() *= 1 + damping;
       damped.diagonal().array() += Scalar(1e-6);
-      Ldlt<Scalar, 6> factors;
-      if (!factors.factor(damped)) return;
-      const V6 step = factors.solve(gradient);
+      Ldlt<Scalar, 6> system;
+      system.matrix() = damped;
+      system.set_right(gradient);
+      if (!system.factor()) return;
+      const V6 step = system.solve();
       RigidPose<Scalar> next;
       next.rotation = SO3<Scalar>::Exp(-step.template head<3>()).matrix() * pose.rotation;
       next.position = pose.position - step.template tail<3>();

@@ -1,0 +1,64 @@
+// A scalar measurement of the tightly coupled filter touches a few blocks of the state: a cable two
+// endcaps and its offset, a foot one rod.
+#pragma once
+
+#include <array>
+
+#include "tensegrity/math/symmetric.hpp"
+#include "tensegrity/tight/belief.hpp"
+
+namespace tensegrity::tight {
+
+// One row of H, as blocks of three columns and at most one single column.
+template <typename Scalar>
+class Row {
+ public:
+  static constexpr int kMaxBlocks = 6;
+  static constexpr int kMost = 3 * kMaxBlocks + 1;  // elements
+
+  void add(int at, const Vector3<Scalar>& h) {
+    for (int k = 0; k < blocks_; ++k) {
+      if (at_[std::size_t(k)] == at) {
+        h_[std::size_t(k)] += h;
+        return;
+      }
+    }
+    at_[std::size_t(blocks_)] = at;
+    h_[std::size_t(blocks_++)] = h;
+  }
+  void add_single(int at, Scalar h) {
+    single_at_ = at;
+    single_ = h;
+  }
+
+  // Calls `use(index, coefficient)` for every element that is not zero.
+  template <typename Use>
+  void for_each(const Use& use) const {
+    if (single_at_ >= 0) use(single_at_, single_);
+    for (int k = 0; k < blocks_; ++k) {
+      for (int i = 0; i < 3; ++i) use(at_[std::size_t(k)] + i, h_[std::size_t(k)][i]);
+    }
+  }
+  // H x
+  Scalar times(const Scalar* x) const {
+    // A sum for each axis: the chains of additions are short.
+    Scalar a = single_at_ >= 0 ? single_ * x[single_at_] : Scalar(0), b = 0, c = 0;
+    for (int k = 0; k < blocks_; ++k) {
+      const Vector3<Scalar>& h = h_[std::size_t(k)];
+      const Scalar* at = x + at_[std::size_t(k)];
+      a += h[0] * at[0];
+      b += h[1] * at[1];
+      c += h[2] * at[2];
+    }
+    return a + b + c;
+  }
+
+ private:
+  std::array<int, kMaxBlocks> at_;
+  std::array<Vector3<Scalar>, kMaxBlocks> h_;
+  int blocks_ = 0;
+  int single_at_ = -1;
+  Scalar single_ = 0;
+};
+
+}  // namespace tensegrity::tight
