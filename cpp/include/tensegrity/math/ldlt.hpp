@@ -79,42 +79,49 @@ class Ldlt {
  private:
   static_assert(Below % 4 == 0, "whole packets");
 
-  // Column j, and those after it.
-  template <int J>
+  // With columns in registers there is code for every column, in small systems for every step of
+  // it, else, where code has to be small, for four together.
+  static constexpr int kTogether = Packet<Scalar>::kSimd ? 1 : 4;
+  static constexpr bool kUnrolled = Packet<Scalar>::kSimd && kRows <= 12;
+
+  // Columns from `First` on.
+  template <int First>
   bool factor_from() {
-    const Scalar pivot = reduce<J / 4, J>();
-    if (!(pivot > 0) || !std::isfinite(pivot)) return false;
-    inverse_[J] = 1 / pivot;
-    if constexpr (J + 1 < N) return factor_from<J + 1>();
+    for (int j = First; j < std::min(First + kTogether, N); ++j) {
+      const Scalar pivot = reduce<First / 4>(j);
+      if (!(pivot > 0) || !std::isfinite(pivot)) return false;
+      inverse_[j] = 1 / pivot;
+    }
+    if constexpr (First + kTogether < N) return factor_from<First + kTogether>();
     return true;
   }
 
-  // Column J less what the columns before it hold of it, from packet `From` on; returns its pivot.
+  // Column j less what the columns before it hold of it, from packet `From` on; returns its pivot.
   // The chain from pivot to pivot is what takes the time; all that is below fits into its pauses.
-  template <int From, int J>
-  Scalar reduce() {
+  template <int From>
+  Scalar reduce(int j) {
     constexpr int kHere = std::min(kRows / 4 - From, Packet<Scalar>::kHeld);
-    Scalar* column = &columns_(4 * From, J);
+    Scalar* column = &columns_(4 * From, j);
     Packet<Scalar> rest[kHere];
 #pragma GCC unroll 12
     for (int i = 0; i < kHere; ++i) rest[i] = Packet<Scalar>(column + 4 * i);
     const auto take = [&](int k) {
-      const Scalar factor = columns_(J, k) * inverse_[k];
+      const Scalar factor = columns_(j, k) * inverse_[k];
       const Scalar* before = &columns_(4 * From, k);
 #pragma GCC unroll 12
       for (int i = 0; i < kHere; ++i) rest[i].subtract(factor, Packet<Scalar>(before + 4 * i));
     };
-    if constexpr (kRows <= 12) {
+    if constexpr (kUnrolled) {
 #pragma GCC unroll 12
-      for (int k = 0; k < J; ++k) take(k);
+      for (int k = 0; k < j; ++k) take(k);
     } else {
 #pragma GCC unroll 1
-      for (int k = 0; k < J; ++k) take(k);
+      for (int k = 0; k < j; ++k) take(k);
     }
 #pragma GCC unroll 12
     for (int i = 0; i < kHere; ++i) rest[i].store(column + 4 * i);
-    if constexpr (From + kHere < kRows / 4) reduce<From + kHere, J>();
-    return rest[0].at(J % 4);
+    if constexpr (From + kHere < kRows / 4) reduce<From + kHere>(j);
+    return rest[0].at(j % 4);
   }
 
   Matrix<Scalar, kRows, N> columns_;
