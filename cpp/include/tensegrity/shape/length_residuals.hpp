@@ -75,8 +75,7 @@ class LengthResiduals {
   }
 
   // J' J, and with `second_order` the second derivatives of the lengths times the residuals as
-  // well, to the lower triangle of `h`. The spin about z, which no length holds,
-  // gets the stiffness t t' / L^2 with t = spin_by_angle.
+  // well, to the lower triangle of `h`; a unit stiffness holds the spin about z.
   template <int Stride>
   void hessian(const Rods<Scalar>& rods, bool second_order, Columns<Scalar, Stride> h) const {
     // A cable resists along itself, and as it is tense also across.
@@ -122,9 +121,11 @@ class LengthResiduals {
     }
 
     const Tangent<Scalar> spin = spin_by_angle(rods);
-    const Scalar stiffness_of_spin = 1 / (4 * rods.half_length() * rods.half_length());
+    Scalar squared = 0;
+    for (int k = 0; k < kTangent; ++k) squared += spin[k] * spin[k];
+    const Scalar unit = squared > 0 ? 1 / squared : Scalar(0);
     const auto set = [&](int row, int column, Scalar value) {
-      h[column][row] = value + stiffness_of_spin * spin[row] * spin[column];
+      h[column][row] = value + unit * spin[row] * spin[column];
     };
     const auto set_block = [&](int row, int column, const Symmetric& m) {
       set(row, column, m[0]), set(row + 1, column, m[1]), set(row + 2, column, m[2]);
