@@ -62,7 +62,7 @@ TEST_CASE("first and second derivatives agree with finite differences") {
     CHECK((length_jacobian(rods) - differences<9>(rods, lengths)).norm() < 1e-8);
 
     const Vector<double, 9> weights = samples.normal<9>(1);
-    const TangentMatrix<double> hessian = weighted_length_hessian(rods, weights);
+    const TangentMatrix<double> hessian = test::weighted_length_hessian(rods, weights);
     // Second derivatives along straight tangent lines from `rods`, not from the moved shape.
     const double h = 1e-4;
     for (int i = 0; i < kTangent; ++i) {
@@ -81,7 +81,7 @@ TEST_CASE("first and second derivatives agree with finite differences") {
     Tangent<double> sum = Tangent<double>::Zero();
     for (int k = 0; k < 9; ++k) {
       vectors.col(k) = samples.normal<kTangent>(1);
-      sum += weighted_length_hessian<double>(rods, Vector<double, 9>::Unit(k)) * vectors.col(k);
+      sum += test::weighted_length_hessian(rods, Vector<double, 9>::Unit(k)) * vectors.col(k);
     }
     CHECK((length_hessian_products(rods, vectors) - sum).norm() < 1e-12);
     const auto distance = [](const Rods<double>& r) { return Vector<double, 1>(fold(r, -1.0)); };

@@ -23,7 +23,7 @@ TEST_CASE("cost, gradient and Hessian of the residuals") {
 
     TangentMatrix<double> dense = jacobian.transpose() * jacobian + spin * spin.transpose();
     for (const bool second_order : {false, true}) {
-      if (second_order) dense += weighted_length_hessian(rods, r);
+      if (second_order) dense += test::weighted_length_hessian(rods, r);
       TangentMatrix<double> off;
       residuals.hessian(rods, second_order, columns(off));
       off -= dense;

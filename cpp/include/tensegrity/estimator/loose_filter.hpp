@@ -87,7 +87,7 @@ class LooseFilter {
       return Status::kNotFinite;
     }
     const Scalar dt =
-        shape_seen_ ? std::max(Scalar(t - shape_time_) * Scalar(1e-9), Scalar(0)) : Scalar(0);
+        shape_seen_ ? std::max(seconds<Scalar>(shape_time_, t), Scalar(0)) : Scalar(0);
     shape_time_ = t;
     shape_seen_ = true;
     const Endcaps<Scalar> before = endcaps_;

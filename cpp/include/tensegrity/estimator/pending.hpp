@@ -11,6 +11,12 @@ namespace tensegrity {
 
 using Nanoseconds = std::int64_t;
 
+// From one stamp to another [s].
+template <typename Scalar>
+Scalar seconds(Nanoseconds from, Nanoseconds to) {
+  return Scalar(to - from) * Scalar(1e-9);
+}
+
 template <typename Scalar>
 struct PendingMeasurement {
   enum class Kind : std::uint8_t { kContacts, kCables };  // at equal stamps contacts go first

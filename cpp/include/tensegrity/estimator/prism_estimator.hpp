@@ -85,7 +85,7 @@ class PrismEstimator {
     } else {
       status = check_sample(gyro, accel);
     }
-    if (status == Status::kOk && imu_seen_ && seconds(t, time_) > config_.max_latency) {
+    if (status == Status::kOk && imu_seen_ && seconds<Scalar>(t, time_) > config_.max_latency) {
       status = Status::kTooLate;
     }
     if (status != Status::kOk) {
@@ -145,10 +145,6 @@ class PrismEstimator {
   static constexpr Scalar kLargestRate = Scalar(200);     // [rad/s], no gyro reaches it
   static constexpr Scalar kLargestForce = Scalar(20000);  // [m/s^2], 2000 g
 
-  static Scalar seconds(Nanoseconds from, Nanoseconds to) {
-    return Scalar(to - from) * Scalar(1e-9);
-  }
-
   // ---- input checks
 
   static Status check_sample(const V3& gyro, const V3& accel) {
@@ -180,7 +176,8 @@ class PrismEstimator {
   Status check_stamp(Nanoseconds t, const Stamps& stamps) const {
     if (stamps.seen && t == stamps.last) return Status::kDuplicate;
     if (stamps.seen && t < stamps.last) return Status::kOutOfOrder;
-    if (imu_seen_ && t < time_ && seconds(t, time_) > config_.max_latency) return Status::kTooLate;
+    if (imu_seen_ && t < time_ && seconds<Scalar>(t, time_) > config_.max_latency)
+      return Status::kTooLate;
     return Status::kOk;
   }
 
@@ -221,7 +218,7 @@ class PrismEstimator {
 
   Status advance(Nanoseconds begin, Nanoseconds t, const inekf::ImuSample<Scalar>& previous,
                  const inekf::ImuSample<Scalar>& sample) {
-    const Scalar dt = seconds(begin, t);
+    const Scalar dt = seconds<Scalar>(begin, t);
     const bool gap = dt > config_.max_imu_gap;
     if (gap) ++health_.imu_gaps;
     if (dt > kLongestBridge) {
@@ -246,7 +243,7 @@ class PrismEstimator {
     Nanoseconds now = begin;
     const auto reach = [&](Nanoseconds stamp) {
       if (stamp <= now) return;
-      const Scalar part = seconds(now, stamp);
+      const Scalar part = seconds<Scalar>(now, stamp);
       // One sample's noise, spread over the parts of a split step.
       const Scalar spread = std::sqrt(dt / part);
       filter_.propagate(mean, part, gyro_std * spread, accel_std * spread);

@@ -51,56 +51,9 @@ LengthJacobian<Scalar> length_jacobian(const Rods<Scalar>& rods) {
   return jacobian;
 }
 
-// Sum over the cables of weight * d2l/dtangent2, 10 x 10 [1/m]: the second-order part of a
-// least-squares Hessian (weights = residuals) or the stress stiffness (weights = a self-stress).
-template <typename Scalar>
-TangentMatrix<Scalar> weighted_length_hessian(const Rods<Scalar>& rods,
-                                              const Vector<Scalar, 9>& weights) {
-  const Endcaps<Scalar> q = rods.endcaps();
-  TangentMatrix<Scalar> hessian = TangentMatrix<Scalar>::Zero();
-  for (int row = 0; row < 9; ++row) {
-    const Cable cable = kPrismCables[static_cast<std::size_t>(row)];
-    Scalar length;
-    const Vector3<Scalar> n = detail::cable_direction(q, cable, length);
-    if (length <= 0) continue;
-    // A cable curves as the part of its motion across itself ...
-    const Matrix3<Scalar> across =
-        weights[row] / length * (Matrix3<Scalar>::Identity() - n * n.transpose());
-    const auto add_block = [&](int a, int b, Scalar sign) {
-      const int ka = free_rod(a);
-      const int kb = free_rod(b);
-      if (ka < 0 || kb < 0) return;
-      const Scalar sa = Scalar(rod_side(a));
-      const Scalar sb = Scalar(rod_side(b));
-      const auto ba = rods.rod(ka).across();
-      const auto bb = rods.rod(kb).across();
-      const Matrix<Scalar, 3, 2> across_bb = sb * (across * bb);
-      hessian.template block<3, 3>(5 * ka, 5 * kb) += sign * across;
-      hessian.template block<3, 2>(5 * ka, 5 * kb + 3) += sign * across_bb;
-      hessian.template block<2, 3>(5 * ka + 3, 5 * kb) += (sign * sa) * (ba.transpose() * across);
-      hessian.template block<2, 2>(5 * ka + 3, 5 * kb + 3) +=
-          (sign * sa) * (ba.transpose() * across_bb);
-    };
-    add_block(cable.from, cable.from, Scalar(1));
-    add_block(cable.to, cable.to, Scalar(1));
-    add_block(cable.from, cable.to, Scalar(-1));
-    add_block(cable.to, cable.from, Scalar(-1));
-    // ... and as the endcaps do, which move on circles about their rods' centres.
-    const auto add_circle = [&](int endcap, Scalar sign) {
-      const int k = free_rod(endcap);
-      if (k < 0) return;
-      const Scalar inward = -sign * Scalar(rod_side(endcap)) * n.dot(rods.rod(k).direction());
-      hessian.template block<2, 2>(5 * k + 3, 5 * k + 3).diagonal().array() +=
-          weights[row] * inward / rods.half_length();
-    };
-    add_circle(cable.from, Scalar(1));
-    add_circle(cable.to, Scalar(-1));
-  }
-  return hessian;
-}
-
 // Sum over the cables of d2l/dtangent2 times that cable's column of `vectors` (10 x 9). A cable
-// curves as in `weighted_length_hessian`, whose 10 x 10 are never formed: it has two ends only.
+// curves as the part of its motion across itself, and as its endcaps do, which move on circles
+// about their rods' centres. The 10 x 10 are never formed: a cable has two ends only.
 template <typename Scalar>
 Tangent<Scalar> length_hessian_products(const Rods<Scalar>& rods,
                                         const Matrix<Scalar, kTangent, 9>& vectors) {
