@@ -88,9 +88,8 @@ class LengthResiduals {
         {wx * x + tension, wx * y, wx * z, wy * y + tension, wy * z, wz * z + tension}};
 
     const auto of = [&](int k) {
-      const auto i = std::size_t(k);
-      return Symmetric{stiffness[0][i], stiffness[1][i], stiffness[2][i],
-                       stiffness[3][i], stiffness[4][i], stiffness[5][i]};
+      return Symmetric{stiffness[0][k], stiffness[1][k], stiffness[2][k],
+                       stiffness[3][k], stiffness[4][k], stiffness[5][k]};
     };
     Ends own;                         // stiffness at endcaps 2 .. 5
     std::array<Symmetric, 4> cross;   // between the rods: by no side, rod 0's, 1's, both
