@@ -45,7 +45,7 @@ warnings: build/.debian ## no warning in headers and libraries, g++ and clang++
 # A part of the tests, because every file of Eigen takes its time; AARCH64_TESTS='.*' takes all.
 AARCH64 := build/aarch64
 AARCH64_RUN := qemu-aarch64 -L /usr/aarch64-linux-gnu
-AARCH64_TESTS ?= math.*|chi_square|shape_solver|shape_geometry|tight_update|tight_propagate|estimator_tight
+AARCH64_TESTS ?= math.*|chi_square|shape_solver|estimator_tight
 
 test-aarch64: build/.debian ## core in double and C library in float on emulated 64-bit ARM
 	@mkdir -p $(AARCH64)
