@@ -176,9 +176,8 @@ class PrismEstimator {
   Status check_stamp(Nanoseconds t, const Stamps& stamps) const {
     if (stamps.seen && t == stamps.last) return Status::kDuplicate;
     if (stamps.seen && t < stamps.last) return Status::kOutOfOrder;
-    if (imu_seen_ && t < time_ && seconds<Scalar>(t, time_) > config_.max_latency)
-      return Status::kTooLate;
-    return Status::kOk;
+    const bool late = imu_seen_ && t < time_ && seconds<Scalar>(t, time_) > config_.max_latency;
+    return late ? Status::kTooLate : Status::kOk;
   }
 
   // ---- time

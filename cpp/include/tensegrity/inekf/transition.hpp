@@ -15,7 +15,6 @@ namespace tensegrity::inekf {
 template <typename Scalar, int Rows>
 class Transition {
  public:
-  using M3 = Matrix3<Scalar>;
   // Where each block of the body's error starts.
   static constexpr int kRotation = 0, kVelocity = 3, kPosition = 6, kGyroBias = 9, kAccelBias = 12;
 
@@ -87,7 +86,7 @@ class Transition {
   }
 
   // P F': columns at .. at + 2 of the group, which see a gyro error through `m`; by ascending `at`.
-  // Rows from `first` on, and those that are read in rows_of.
+  // Rows from `first` on, and those that `all_rows` reads.
   template <typename P>
   void group_columns(P& covariance, int at, const Block<Scalar>& m, int first, int rows) {
     for (int k = 0; k < 3; ++k) m[std::size_t(k)].store(&by_(at, k));
@@ -158,10 +157,10 @@ class Transition {
 
  private:
   static constexpr int kBody = padded(kGyroBias);  // rows of the body
-  // Columns of A that are not zero: zeta_bg, and in the body's rows xi_Rx, xi_Ry, xi_v, zeta_ba.
   static constexpr int kReadRows = packet_start(kGyroBias);
   static constexpr int kGroup = 3;  // packets of the group's rows at once
   static_assert(kGyroBias % 4 == 1 && kAccelBias % 4 == 0 && kRotation == 0 && kVelocity == 3);
+  // Columns of A that are not zero: zeta_bg, and in the body's rows xi_Rx, xi_Ry, xi_v, zeta_ba.
   static constexpr int kByTilt = 3, kByVelocity = 5, kByAccel = 8, kColumns = 11;
 
   static Packet<Scalar> unit(int k) {

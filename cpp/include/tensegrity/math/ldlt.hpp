@@ -41,11 +41,10 @@ class Ldlt {
   // False unless A is positive definite (to rounding) and finite.
   bool factor() { return factor_from<0>(); }
 
-  // After `factor`, with D^-1 at hand every column is known up to its factor D.
+  // After `factor`; columns hold L D, y D and W D of the head of this file.
   const Vector<Scalar, N>& inverse_diagonal() const { return inverse_; }
-  Scalar ld(int row, int column) const { return columns_(row, column); }  // L D
-  Scalar yd(int j) const { return columns_(kRight, j); }                  // L^-1 b
-  const Scalar* wd(int j) const { return &columns_(kBelow, j); }          // B L^-T, column j
+  Scalar yd(int j) const { return columns_(kRight, j); }          // L^-1 b
+  const Scalar* wd(int j) const { return &columns_(kBelow, j); }  // B L^-T, column j
 
   // A^-1 b
   Vector<Scalar, N> solve() const {
