@@ -251,6 +251,63 @@ class IpoptSolver::Problem : public Ipopt::TNLP {
   Eigen::VectorXd multipliers_;
 };
 
+namespace {
+
+// Ipopt for one kind of start. It is built once: later solves keep its vectors and the symbolic
+// analysis of MUMPS, which no change of lengths changes.
+class Application {
+ public:
+  Application(const IpoptOptions& options, bool warm) : ipopt_(new Ipopt::IpoptApplication(false)) {
+    const auto set = ipopt_->Options();
+    set->SetIntegerValue("print_level", 0);
+    set->SetStringValue("sb", "yes");  // no banner
+    set->SetStringValue("linear_solver", "mumps");
+    set->SetNumericValue("tol", options.tolerance);
+    set->SetIntegerValue("max_iter", options.max_iterations);
+    // Twelve variables need no tenfold work space for fill-in: taken from the system and given back
+    // at every factorisation, it costs more than the factorisation. Ipopt adds to it on demand.
+    set->SetIntegerValue("mumps_mem_percent", 10);
+    // One solve a step, no residuals and refinement: the system is dense and well scaled.
+    set->SetStringValue("fast_step_computation", "yes");
+    set->SetStringValue("warm_start_init_point", warm ? "yes" : "no");
+    // With its multipliers a solution starts below the last barrier of the tolerance, and none has
+    // to be lowered. A cold start needs a barrier only where inequalities become active: no robot
+    // is near those of the mutual moments, many are cut off by those of the paper.
+    const double cold_barrier = options.constraints == ConstraintSet::kMutualMoment ? 1e-7 : 1e-3;
+    set->SetNumericValue("mu_init", warm ? options.tolerance / 100 : cold_barrier);
+    // Warm starts stay where they are instead of being pushed away from active constraints.
+    for (const char* name :
+         {"warm_start_bound_push", "warm_start_slack_bound_push", "warm_start_bound_frac",
+          "warm_start_slack_bound_frac", "warm_start_mult_bound_push"}) {
+      set->SetNumericValue(name, 1e-9);
+    }
+    if (ipopt_->Initialize("") != Ipopt::Solve_Succeeded) {
+      throw std::runtime_error("Ipopt could not be initialised; is its solver MUMPS installed?");
+    }
+  }
+
+  // From where `problem`, always the same, starts to a local solution; true when Ipopt converged.
+  bool solve(const Ipopt::SmartPtr<Ipopt::TNLP>& problem) {
+    ipopt_->Options()->SetStringValue("warm_start_same_structure", built_ ? "yes" : "no");
+    const Ipopt::ApplicationReturnStatus status =
+        built_ ? ipopt_->ReOptimizeTNLP(problem) : ipopt_->OptimizeTNLP(problem);
+    built_ = true;
+    return status == Ipopt::Solve_Succeeded || status == Ipopt::Solved_To_Acceptable_Level;
+  }
+
+  // Of the last solve.
+  int iterations() const {
+    const auto statistics = ipopt_->Statistics();
+    return IsValid(statistics) ? statistics->IterationCount() : 0;
+  }
+
+ private:
+  Ipopt::SmartPtr<Ipopt::IpoptApplication> ipopt_;
+  bool built_ = false;
+};
+
+}  // namespace
+
 struct IpoptSolver::Impl {
   Impl(const Prism<double>& prism_in, const Options& options_in)
       : prism(prism_in),
@@ -258,33 +315,13 @@ struct IpoptSolver::Impl {
         reference(prism.undeformed()),
         endcaps(reference),
         problem(new Problem(prism, options.constraints)),
-        application(new Ipopt::IpoptApplication(false)) {
-    const auto set = application->Options();
-    set->SetIntegerValue("print_level", 0);
-    set->SetStringValue("sb", "yes");  // no banner
-    set->SetStringValue("linear_solver", "mumps");
-    set->SetNumericValue("tol", options.tolerance);
-    set->SetIntegerValue("max_iter", options.max_iterations);
-    // Warm starts stay where they are instead of being pushed away from active constraints.
-    for (const char* name :
-         {"warm_start_bound_push", "warm_start_slack_bound_push", "warm_start_bound_frac",
-          "warm_start_slack_bound_frac", "warm_start_mult_bound_push"}) {
-      set->SetNumericValue(name, 1e-9);
-    }
-    if (application->Initialize("") != Ipopt::Solve_Succeeded) {
-      throw std::runtime_error("Ipopt could not be initialised; is its solver MUMPS installed?");
-    }
-  }
+        cold_start(options, false),
+        warm_start(options, true) {}
 
-  // From where `problem` starts to a local solution; true when Ipopt converged.
-  bool run(bool with_multipliers) {
-    const auto set = application->Options();
-    set->SetStringValue("warm_start_init_point", with_multipliers ? "yes" : "no");
-    set->SetNumericValue("mu_init", with_multipliers ? 1e-8 : 1e-3);
-    const Ipopt::ApplicationReturnStatus status = application->OptimizeTNLP(problem);
-    const auto statistics = application->Statistics();
-    if (IsValid(statistics)) iterations += statistics->IterationCount();
-    return status == Ipopt::Solve_Succeeded || status == Ipopt::Solved_To_Acceptable_Level;
+  bool run(Application& from) {
+    const bool converged = from.solve(problem);
+    iterations += from.iterations();
+    return converged;
   }
 
   // Whether the present point of `problem` is the robot; one that is mirrored becomes so.
@@ -308,7 +345,7 @@ struct IpoptSolver::Impl {
   int iterations = 0;
   bool warm = false;
   Ipopt::SmartPtr<Problem> problem;
-  Ipopt::SmartPtr<Ipopt::IpoptApplication> application;
+  Application cold_start, warm_start;
 };
 
 IpoptSolver::IpoptSolver(const Prism<double>& prism, const Options& options)
@@ -325,12 +362,12 @@ Status IpoptSolver::solve(const CableLengths<double>& lengths) {
   self.problem->set_lengths(lengths);
   const Problem::Point previous = self.problem->point();
 
-  bool converged = self.warm && self.run(true);
+  bool converged = self.warm && self.run(self.warm_start);
   bool found = converged && self.is_robot();
   for (int k = 0; !found && k < kColdStarts; ++k) {
     self.problem->start_at(
-        in_procrustes_gauge(cold_start(self.prism, k).endcaps(), self.reference));
-    const bool start_converged = self.run(false);
+        in_procrustes_gauge(shape::cold_start(self.prism, k).endcaps(), self.reference));
+    const bool start_converged = self.run(self.cold_start);
     converged = converged || start_converged;
     found = start_converged && self.is_robot();
   }
