@@ -32,34 +32,39 @@ void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravit
   using V3 = Vector3<Scalar>;
   using M3 = Matrix3<Scalar>;
   const ImuSample<Scalar> motion{imu.gyro - belief.gyro_bias, imu.accel - belief.accel_bias};
-  // Integral of R w: w is an eigenvector of Exp(w t).
-  const V3 turn = belief.rotation * motion.gyro * dt;
   const Strapdown<Scalar> body =
       integrate(belief.rotation, belief.velocity, belief.position, motion, dt, gravity);
 
-  // Contact points: d+ = d + r turn x e_z, and the touching point d - r e_z is what turns with R,
-  //   xi_d+ = xi_d + r turn x (e_z x xi_R) - int (d - r e_z) x R zeta_g
-  const V3 up = V3::UnitZ();
-  const bool rolls = rolling.radius > 0;
-  M3 anchor_by_rotation;
-  if (rolls) anchor_by_rotation = rolling.radius * hat(turn) * hat(up);
+  auto& p = belief.covariance;
   const int n = belief.dim(), rows = padded(n);
   const int anchors = belief.anchor_count;
-  Transition<Scalar, B::Covariance::RowsAtCompileTime> transition(body, noise.gyro, noise.accel);
-  transition.set_zero(B::kExtra, B::kAnchors);
-  transition.set_zero(n, rows);
+  const V3 up = V3::UnitZ();
+  const bool rolls = rolling.radius > 0;
 
   // ---- P F'
-  auto& p = belief.covariance;
+  // Contact points: d+ = d + r turn x e_z, and the touching point d - r e_z is what turns with R,
+  //   xi_d+ = xi_d + r turn x (e_z x xi_R) - int (d - r e_z) x R zeta_g
+  M3 anchor_by_rotation;
+  if (rolls) {
+    // Integral of R w: w is an eigenvector of Exp(w t).
+    const V3 turn = belief.rotation * motion.gyro * dt;
+    belief.anchors.leftCols(anchors).colwise() += rolling.radius * turn.cross(up);
+    anchor_by_rotation = rolling.radius * hat(turn) * hat(up);
+    for (int i = 0; i < anchors; ++i) {
+      add_columns(p, B::anchor_index(i), B::kRotation, anchor_by_rotation, 0, rows);
+    }
+  }
+  Transition<Scalar, B::Covariance::RowsAtCompileTime> transition(body, noise.gyro, noise.accel,
+                                                                  rows);
   for (int i = 0; i < anchors; ++i) {
-    const int at = B::anchor_index(i);
-    if (rolls) belief.anchors.col(i) += rolling.radius * turn.cross(up);
-    const Block<Scalar> by_gyro =
-        body.column_by_gyro(Packet<Scalar>(V3(belief.anchors.col(i) - rolling.radius * up)));
-    if (rolls) add_columns(p, at, B::kRotation, anchor_by_rotation, 0, rows);
-    transition.group_columns(p, at, by_gyro, rolls ? 0 : packet_start(at), rows);
+    const V3 touching = belief.anchors.col(i) - rolling.radius * up;
+    transition.set_group(B::anchor_index(i), body.column_by_gyro(Packet<Scalar>(touching)));
   }
   transition.body_columns(p, rows);
+  for (int i = 0; i < anchors; ++i) {
+    const int at = B::anchor_index(i);
+    transition.group_columns(p, at, rolls ? 0 : packet_start(at), rows);
+  }
 
   // ---- F (P F'): rows from the diagonal on
   for (int j = 0; rolls && j < n; ++j) {

@@ -45,10 +45,11 @@ struct Strapdown {
 // Moves R, v [m/s] and p [m] by `imu` without its biases, over dt [s].
 //   R+ = R G0, v+ = v + R G1 a dt + g dt, p+ = p + v dt + R G2 a dt^2 + g dt^2/2
 //
-// With x = omega dt and y = R x all of it is made of the columns of R, y x R and y x (y x R):
-//   R Gamma_m(x) = R / m! + c_{m+1} hat(y) R + c_{m+2} hat(y)^2 R,
-//   R d(Gamma_m(x) a)/dx = -c hat(R a) R + d (y a' + (x'a) R) + s x',
-//   s = c* y x R a + d* y x (y x R a) - 2 d R a,
+// With x = omega dt, y = R x and f = R a, all of it is made of y, f and the columns r_j of R: the
+// others of these give R hat(v) e_j = R v x r_j, and hat(x)^2 = x x' - |x|^2 I. In column j
+//   R Gamma_m(x) = c_m r_j + c_{m+1} y x r_j + c_{m+2} x_j y,
+//   R d(Gamma_m(x) a)/dx = -c f x r_j + d (a_j y + (x . a) r_j) + x_j s,
+//   s = c* y x f + d* (x . a) y - (d* |x|^2 + 2 d) f,
 // with c = c_{m+1}, d = c_{m+2} and their slopes c*, d*.
 template <typename Scalar, typename Velocity, typename Position>
 Strapdown<Scalar> integrate(Matrix3<Scalar>& rotation, Velocity&& velocity, Position&& position,
@@ -75,18 +76,25 @@ Strapdown<Scalar> integrate(Matrix3<Scalar>& rotation, Velocity&& velocity, Posi
     return sum;
   };
 
+  // R v x r_j
+  const auto across = [&](const V3& v, int j) {
+    P product = v[(j + 2) % 3] * r[std::size_t(j + 1) % 3];
+    product.subtract(v[(j + 1) % 3], r[std::size_t(j + 2) % 3]);
+    return product;
+  };
   const P y = turned(r, x), force = turned(r, a);
+  const P y2 = c.c2 * y, dt_y3 = dt * c.c3 * y, dt2_y4 = dt2 * c.c4 * y;
   Strapdown<Scalar> s;
   s.dt = dt;
   s.fall = gravity * dt;
-  Block<Scalar> next, r_g2, across;  // R Gamma_0, R Gamma_2 dt^2, force x R
-  for (std::size_t j = 0; j < 3; ++j) {
-    const P once = P::cross(y, r[j]), twice = P::cross(y, once);
-    s.int_r[j] = combine(dt, r[j], dt * c.c2, once, dt * c.c3, twice);
-    r_g2[j] = combine(dt2 / 2, r[j], dt2 * c.c3, once, dt2 * c.c4, twice);
-    s.position_by_accel[j] = Scalar(-1) * r_g2[j];
-    across[j] = P::cross(force, r[j]);
-    next[j] = combine(Scalar(1), r[j], c.c1, once, c.c2, twice);
+  Block<Scalar> next, r_g2;  // R Gamma_0, R Gamma_2 dt^2
+  for (int j = 0; j < 3; ++j) {
+    const std::size_t k = std::size_t(j);
+    const P once = across(x, j);
+    s.int_r[k] = combine(dt * c.c1, r[k], dt * c.c2, once, x[j], dt_y3);
+    r_g2[k] = combine(dt2 * c.c2, r[k], dt2 * c.c3, once, x[j], dt2_y4);
+    s.position_by_accel[k] = Scalar(-1) * r_g2[k];
+    next[k] = combine(c.c0, r[k], c.c1, once, x[j], y2);
   }
   const P g(Scalar(0), Scalar(0), -gravity, Scalar(0));
   const P start_velocity(velocity);
@@ -94,22 +102,26 @@ Strapdown<Scalar> integrate(Matrix3<Scalar>& rotation, Velocity&& velocity, Posi
   const P faster = start_velocity + (turned(s.int_r, a) + dt * g);
   moved.store_vector(position);
   faster.store_vector(velocity);
-  s.velocity_by_gyro = s.column_by_gyro(faster);
-  s.position_by_gyro = s.column_by_gyro(moved);
-  const Scalar xa = x.dot(a);
-  const P once = P::cross(y, force), twice = P::cross(y, once);
-  const P by_x1 = combine(slopes.c2, once, slopes.c3, twice, -2 * c.c3, force);
-  const P by_x2 = combine(slopes.c3, once, slopes.c4, twice, -2 * c.c4, force);
-  const auto subtract = [&](P& to, int j, Scalar dtn, Scalar c, Scalar d, const P& by_x) {
-    to.add(dtn * c, across[std::size_t(j)]);
-    to.subtract(dtn * d * a[j], y);
-    to.subtract(dtn * d * xa, r[std::size_t(j)]);
-    to.subtract(dtn * x[j], by_x);
+
+  // What a gyro error does to v or p: -hat(column) int R - dtn R d(Gamma_m(x) a)/dx.
+  const Scalar xa = x.dot(a), x2 = c.squared_angle;
+  const P swept = P::cross(y, force);
+  const auto by_gyro = [&](const P& column, Scalar dtn, Scalar c, Scalar d, Scalar c_slope,
+                           Scalar d_slope) {
+    const P by_x =
+        combine(-dtn * c_slope, swept, -dtn * d_slope * xa, y, dtn * (d_slope * x2 + 2 * d), force);
+    const P by_a = -dtn * d * y;
+    Block<Scalar> m = s.column_by_gyro(column);
+    for (int j = 0; j < 3; ++j) {
+      const P& own = r[std::size_t(j)];
+      P sum = combine(a[j], by_a, -dtn * d * xa, own, x[j], by_x);
+      sum.add(dtn * c, across(a, j));
+      m[std::size_t(j)] = m[std::size_t(j)] + sum;
+    }
+    return m;
   };
-  for (int j = 0; j < 3; ++j) {
-    subtract(s.velocity_by_gyro[std::size_t(j)], j, dt2, c.c2, c.c3, by_x1);
-    subtract(s.position_by_gyro[std::size_t(j)], j, dt3, c.c3, c.c4, by_x2);
-  }
+  s.velocity_by_gyro = by_gyro(faster, dt2, c.c2, c.c3, slopes.c2, slopes.c3);
+  s.position_by_gyro = by_gyro(moved, dt3, c.c3, c.c4, slopes.c3, slopes.c4);
   next = orthonormalized(next);
   for (int j = 0; j < 3; ++j) {
     auto column = rotation.col(j);

@@ -18,10 +18,13 @@ class Transition {
   // Where each block of the body's error starts.
   static constexpr int kRotation = 0, kVelocity = 3, kPosition = 6, kGyroBias = 9, kAccelBias = 12;
 
-  // `gyro_std` [rad/s] and `accel_std` [m/s^2]: of the sample.
-  Transition(const Strapdown<Scalar>& body, Scalar gyro_std, Scalar accel_std)
+  // `gyro_std` [rad/s] and `accel_std` [m/s^2]: of the sample. Of `rows` rows, a multiple of four,
+  // those after the body's see no error of the gyro, but for those of `set_group`.
+  Transition(const Strapdown<Scalar>& body, Scalar gyro_std, Scalar accel_std, int rows)
       : body_(body), gyro_variance_(gyro_std * gyro_std), accel_variance_(accel_std * accel_std) {
-    set_zero(kBody, kAccelBias + 3);
+    for (int k = 0; k < 3; ++k) {
+      for (int row = kBody; row < rows; row += 4) Packet<Scalar>().store(&by_(row, k));
+    }
     for (int k = 0; k < 3; ++k) {
       const std::size_t column = std::size_t(k);
       const Packet<Scalar> by_int_r = Scalar(-1) * body.int_r[column];
@@ -34,12 +37,6 @@ class Transition {
     const Packet<Scalar> by_x = -body.fall * unit(1), by_y = body.fall * unit(0);
     set_column(kByTilt, {}, by_x, half * by_x);
     set_column(kByTilt + 1, {}, by_y, half * by_y);
-  }
-
-  // Rows that no error of the gyro reaches. Every row after those of the biases has to be set, by
-  // this or by `group_columns`.
-  void set_zero(int row, int end) {
-    for (; row < end; ++row) by_.row(row).template head<3>().setZero();
   }
 
   // P F': the body's columns, all `rows` of them.
@@ -85,11 +82,14 @@ class Transition {
     }
   }
 
-  // P F': columns at .. at + 2 of the group, which see a gyro error through `m`; by ascending `at`.
-  // Rows from `first` on, and those that `all_rows` reads.
-  template <typename P>
-  void group_columns(P& covariance, int at, const Block<Scalar>& m, int first, int rows) {
+  // Rows at .. at + 2 of the group see a gyro error through `m`. By ascending `at`.
+  void set_group(int at, const Block<Scalar>& m) {
     for (int k = 0; k < 3; ++k) m[std::size_t(k)].store(&by_(at, k));
+  }
+
+  // P F': columns at .. at + 2 of the group. Rows from `first` on, and those that `all_rows` reads.
+  template <typename P>
+  void group_columns(P& covariance, int at, int first, int rows) const {
     add_columns(covariance, at, kGyroBias, by_.template block<3, 3>(at, 0), first, rows,
                 first > kReadRows ? kReadRows : -1);
   }
@@ -118,27 +118,35 @@ class Transition {
         return row;
       };
       load(kReadRows);
+      Packet<Scalar> p_z = x0;
       const Packet<Scalar> gx = noisy(x1, gyro_variance_, 0), gy = noisy(x2, gyro_variance_, 1),
                            gz = noisy(x3, gyro_variance_, 2);
       gx.store(gyro[0] + j);
       gy.store(gyro[1] + j);
       gz.store(gyro[2] + j);
       if (j >= kBody) continue;
-      gx.store(seen[0]);
-      gy.store(seen[1]);
-      gz.store(seen[2]);
+      const auto see = [&](int column, const Packet<Scalar>& x) {
+        x.store(seen[column]);
+        p_z.add(by[column][kReadRows], x);
+      };
+      see(0, gx);
+      see(1, gy);
+      see(2, gz);
       load(kAccelBias);
-      noisy(x0, accel_variance_, kByAccel).store(seen[kByAccel]);
-      noisy(x1, accel_variance_, kByAccel + 1).store(seen[kByAccel + 1]);
-      noisy(x2, accel_variance_, kByAccel + 2).store(seen[kByAccel + 2]);
+      see(kByAccel, noisy(x0, accel_variance_, kByAccel));
+      see(kByAccel + 1, noisy(x1, accel_variance_, kByAccel + 1));
+      see(kByAccel + 2, noisy(x2, accel_variance_, kByAccel + 2));
       load(0);
-      x0.store(seen[kByTilt]);
-      x1.store(seen[kByTilt + 1]);
-      x3.store(seen[kByVelocity]);
+      see(kByTilt, x0);
+      see(kByTilt + 1, x1);
+      see(kByVelocity, x3);
       load(4);
-      x0.store(seen[kByVelocity + 1]);
-      x1.store(seen[kByVelocity + 2]);
-      add_product<false>(own, by, Columns<const Scalar, 4>{seen[0]}, kColumns, j, kBody);
+      see(kByVelocity + 1, x0);
+      see(kByVelocity + 2, x1);
+      for (int c = 0; c < 4; ++c) own[c][kReadRows] = p_z.at(c);
+      if (j < kReadRows) {
+        add_product<false>(own, by, Columns<const Scalar, 4>{seen[0]}, kColumns, j, kReadRows);
+      }
     }
     const Columns<const Scalar, Rows> errors{gyro[0]};
     for (int row = group; row < rows; row += 4 * kGroup) {

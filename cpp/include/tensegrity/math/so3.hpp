@@ -29,9 +29,10 @@ Vector3<typename Derived::Scalar> vee(const Eigen::MatrixBase<Derived>& m) {
 // c_m = sum_k (-a^2)^k / (2 k + m)! for the angle a: what the integrals of a rotation are made of.
 template <typename Scalar>
 struct RotationSeries {
-  Scalar c1, c2, c3, c4;
+  Scalar squared_angle;  // a^2
+  Scalar c0, c1, c2, c3, c4;
 
-  explicit RotationSeries(Scalar a2) : squared_angle_(a2) {
+  explicit RotationSeries(Scalar a2) : squared_angle(a2) {
     // Stable for small angles. Reciprocals are written out: a division takes as long as ten
     // multiplications.
     if (a2 < small_angle_squared()) {
@@ -46,6 +47,7 @@ struct RotationSeries {
       c3 = (1 - c1) / a2;
       c4 = (Scalar(0.5) - c2) / a2;
     }
+    c0 = 1 - a2 * c2;
   }
 
   // (dc_m/da) / a = (c_{m-1} - m c_m) / a^2, which cancels for small a: there by its series, whose
@@ -54,7 +56,7 @@ struct RotationSeries {
     Scalar c2, c3, c4;
   };
   Slopes slopes() const {
-    const Scalar a2 = squared_angle_;
+    const Scalar a2 = squared_angle;
     if (a2 < Scalar(0.1)) {
       return {-over(12) + a2 * over(180) * (1 - a2 * over(112) * 3 * (1 - a2 * over(135) * 2)),
               -over(60) + a2 * over(1260) * (1 - a2 * over(48) * (1 - a2 * over(165) * 2)),
@@ -69,9 +71,6 @@ struct RotationSeries {
     return sizeof(Scalar) == sizeof(float) ? Scalar(0.05) : Scalar(0.01);
   }
   static constexpr Scalar over(int n) { return Scalar(1) / Scalar(n); }
-
- private:
-  Scalar squared_angle_;
 };
 
 // Gamma_m(x) = sum_k hat(x)^k / (k + m)!  (Bloesch et al. 2013; Hartley et al. 2020, eq. 33).

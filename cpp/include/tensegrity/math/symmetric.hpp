@@ -12,9 +12,9 @@ namespace tensegrity {
 
 // Columns `to` .. `to + 2` of P get those of `from` times m': P <- P (I + m at rows `to`, columns
 // `from`)'. Rows `first` to `end` (multiples of four), and with `also` >= 0 the four from there.
-template <typename Derived>
-void add_columns(Eigen::MatrixBase<Derived>& p, int to, int from,
-                 const Matrix3<typename Derived::Scalar>& m, int first, int end, int also = -1) {
+template <typename Derived, typename Block>
+void add_columns(Eigen::MatrixBase<Derived>& p, int to, int from, const Eigen::MatrixBase<Block>& m,
+                 int first, int end, int also = -1) {
   using Scalar = typename Derived::Scalar;
   constexpr int kStride = Derived::RowsAtCompileTime;
   Scalar* target = &p.derived().coeffRef(0, to);

@@ -31,16 +31,16 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   x.template middleCols<4>(2) += dt * x.template middleCols<4>(6);
   belief.rate = motion.gyro;
 
-  inekf::Transition<Scalar, B::Dim> transition(body, noise.gyro, noise.accel);
-  transition.set_zero(B::kOffsets, padded(B::kOffsets));
+  constexpr int kGroupEnd = padded(B::kOffsets);
+  inekf::Transition<Scalar, B::Dim> transition(body, noise.gyro, noise.accel, kGroupEnd);
 
   // ---- P F': of the rows above the diagonal those that are read below
   auto& p = belief.covariance;
   for (int c = 2; c < B::kColumns; ++c) {
     const int at = B::column_index(c);
     if (at < B::kRates) add_columns(p, at, B::kRates + (at - B::kEndcaps), dt, B::Dim);
-    transition.group_columns(p, at, body.column_by_gyro(Packet<Scalar>(x.col(c))), packet_start(at),
-                             B::Dim);
+    transition.set_group(at, body.column_by_gyro(Packet<Scalar>(x.col(c))));
+    transition.group_columns(p, at, packet_start(at), B::Dim);
   }
   transition.body_columns(p, B::Dim);
 
@@ -48,7 +48,7 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   for (int j = 0; j < B::kRates; ++j) {
     p.col(j).template segment<12>(B::kEndcaps) += dt * p.col(j).template segment<12>(B::kRates);
   }
-  transition.all_rows(p, packet_start(B::kEndcaps), padded(B::kOffsets));
+  transition.all_rows(p, packet_start(B::kEndcaps), kGroupEnd);
 
   // ---- walks of the step
   const auto walk = [&](int at, int size, Scalar std) {
