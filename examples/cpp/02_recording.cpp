@@ -57,19 +57,23 @@ int main(int argc, char** argv) {
   double path = 0;  // m
   Eigen::Vector3d last = Eigen::Vector3d::Zero();
   std::size_t next_cables = 0, next_contacts = 0;
-  for (const Line& sample : imu) {
-    for (; next_contacts < contacts.size() && contacts[next_contacts].t <= sample.t;
-         ++next_contacts) {
+  // Samples in the order of `tensegrity.estimate`: of one stamp the IMU comes first.
+  const auto feed_before = [&](tensegrity::Nanoseconds end) {
+    for (; next_contacts < contacts.size() && contacts[next_contacts].t < end; ++next_contacts) {
       std::array<bool, 6> flags{};
       for (std::size_t i = 0; i < 6; ++i) flags[i] = contacts[next_contacts].values.at(i) > 0.5;
       estimator.contacts(contacts[next_contacts].t, flags);
     }
-    for (; next_cables < cables.size() && cables[next_cables].t <= sample.t; ++next_cables) {
+    for (; next_cables < cables.size() && cables[next_cables].t < end; ++next_cables) {
       estimator.cables(cables[next_cables].t,
                        tensegrity::CableLengths<double>(cables[next_cables].values.data()));
     }
+  };
+  for (const Line& sample : imu) {
+    feed_before(sample.t);
     estimator.imu(sample.t, Eigen::Vector3d(sample.values.data()),
                   Eigen::Vector3d(sample.values.data() + 3));
+    feed_before(sample.t + 1);
     const auto state = estimator.state();
     if (!state.initialized) continue;
     path += (state.position - last).norm();

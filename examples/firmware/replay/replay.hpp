@@ -19,23 +19,27 @@
 
 namespace replay {
 
-// The IMU sample, after the contacts and cables that are due with it.
+// The IMU sample between what came before it and what came with it, as `estimate` of Python calls.
 template <typename Estimator>
 void imu_cycle(Estimator& estimator, const ImuRow& imu, const ContactRow*& contacts,
                const CableRow*& cables, const Recording& recording) {
   using Scalar = typename Estimator::V3::Scalar;
-  for (; contacts != recording.contacts.end() && contacts->t <= imu.t; ++contacts) {
-    std::array<bool, 6> flags;
-    for (std::size_t i = 0; i < flags.size(); ++i) flags[i] = contacts->flags[i] != 0;
-    estimator.contacts(contacts->t, flags);
-  }
-  for (; cables != recording.cables.end() && cables->t <= imu.t; ++cables) {
-    using Lengths = Eigen::Map<const tensegrity::CableLengths<float>>;
-    estimator.cables(cables->t, Lengths(cables->lengths).template cast<Scalar>());
-  }
+  const auto feed_before = [&](tensegrity::Nanoseconds end) {
+    for (; contacts != recording.contacts.end() && contacts->t < end; ++contacts) {
+      std::array<bool, 6> flags;
+      for (std::size_t i = 0; i < flags.size(); ++i) flags[i] = contacts->flags[i] != 0;
+      estimator.contacts(contacts->t, flags);
+    }
+    for (; cables != recording.cables.end() && cables->t < end; ++cables) {
+      using Lengths = Eigen::Map<const tensegrity::CableLengths<float>>;
+      estimator.cables(cables->t, Lengths(cables->lengths).template cast<Scalar>());
+    }
+  };
   using Vector = Eigen::Map<const tensegrity::Vector3<float>>;
+  feed_before(imu.t);
   estimator.imu(imu.t, Vector(imu.gyro).template cast<Scalar>(),
                 Vector(imu.accel).template cast<Scalar>());
+  feed_before(imu.t + 1);
 }
 
 template <typename Scalar>

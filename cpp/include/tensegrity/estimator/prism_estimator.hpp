@@ -4,7 +4,8 @@
 // Order and time. Every sensor has its own stamps [ns] and rate, and calls may interleave in any
 // order. The state lives at the stamp of the newest IMU sample.
 //  - cables or contacts ahead of the IMU wait until a sample reaches their stamp; the step is then
-//    split there, so that the order of the calls does not matter;
+//    split there, so that the order of the calls does not matter. Of one stamp it does: contact
+//    points end a step of the tightly coupled filter, with the cables called until then;
 //  - up to `max_latency` behind the state they are taken as if they were new; older: kTooLate;
 //  - behind the newest of their own kind: kOutOfOrder; equal to it: kDuplicate. Both are dropped;
 //  - an IMU step longer than `max_imu_gap` returns kGap: the motion between is bridged by the mean
