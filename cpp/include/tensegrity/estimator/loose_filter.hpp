@@ -56,7 +56,7 @@ class LooseFilter {
       return false;
     }
     start_attitude(rest);
-    start_spin();
+    start_spin(rest.contacts);
     started_ = true;
     update_contacts();
     return true;
@@ -199,10 +199,9 @@ class LooseFilter {
   }
 
   // phi from the endcaps that are on the ground, and the height of the IMU above it.
-  void start_spin() {
+  void start_spin(const Flags& contacts) {
     const V3 up = belief_.rotation.transpose() * V3::UnitZ();
-    const SpinStart<Scalar> spin =
-        find_spin(endcaps_, up, contacts_seen_ ? flags_ : Flags{}, kStartHeightStd);
+    const SpinStart<Scalar> spin = find_spin(endcaps_, up, contacts, kStartHeightStd);
     belief_.extra[0] = spin.found ? spin.angle : Scalar(0);
     const Scalar variance =
         spin.found ? spin.variance : config_.spin_prior_std * config_.spin_prior_std;

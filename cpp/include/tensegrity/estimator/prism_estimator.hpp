@@ -209,6 +209,7 @@ class PrismEstimator {
 
   Status apply(const Measurement& measurement) {
     if (measurement.kind == Measurement::Kind::kContacts) {
+      contacts_ = measurement.flags;
       filter_.set_contacts(measurement.flags);
       return Status::kOk;
     }
@@ -268,7 +269,22 @@ class PrismEstimator {
     return Status::kOk;
   }
 
+  // Flags before the start: the spin is found from them, and the filter does not get over a wrong
+  // one. At rest they are constant but for errors, so that what most samples of the still window
+  // say is right where a single one is wrong with probability `contact_error` per endcap.
+  void count_contacts() {
+    for (std::size_t i = 0; i < contacts_.size(); ++i) still_contacts_[i] += contacts_[i] ? 1 : -1;
+  }
+
+  // All false where there were no flags.
+  Flags most_contacts() const {
+    Flags flags;
+    for (std::size_t i = 0; i < flags.size(); ++i) flags[i] = still_contacts_[i] > 0;
+    return flags;
+  }
+
   Status start(const V3& gyro, const V3& accel) {
+    count_contacts();
     const int before = start_.samples();
     const bool still = !config_.static_bias_initialization || start_.add(gyro, accel);
     if (!still) {
@@ -279,8 +295,8 @@ class PrismEstimator {
     const AtRest<Scalar> rest =
         config_.static_bias_initialization
             ? AtRest<Scalar>{start_.mean_gyro(), start_.mean_accel(), start_.samples(),
-                             mean_lengths_}
-            : AtRest<Scalar>{config_.gyroscope_bias, accel, 1, mean_lengths_};
+                             mean_lengths_, most_contacts()}
+            : AtRest<Scalar>{config_.gyroscope_bias, accel, 1, mean_lengths_, most_contacts()};
     if (!measured || !filter_.start(rest, health_)) {
       start_.clear();
       forget_still();
@@ -293,6 +309,7 @@ class PrismEstimator {
   // The window was given up.
   void forget_still() {
     still_cables_.fill(0);
+    still_contacts_.fill(0);
     filter_.forget_still();
   }
 
@@ -303,6 +320,9 @@ class PrismEstimator {
   PendingQueue<Scalar> pending_;
   CableLengths<Scalar> mean_lengths_ = CableLengths<Scalar>::Zero();
   std::array<int, 9> still_cables_{};  // how many lengths of each cable are in the mean
+  // IMU samples of the still window with the endcap on the ground, less those without.
+  std::array<int, 6> still_contacts_{};
+  Flags contacts_{};  // the last flags
   inekf::ImuSample<Scalar> last_sample_{V3::Zero(), V3::Zero()};
   PrismHealth health_;
   Stamps cable_stamps_, contact_stamps_;

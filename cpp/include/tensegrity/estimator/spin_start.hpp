@@ -1,4 +1,4 @@
-// The spin angle at rest, from gravity and the first contacts.
+// The spin angle at rest, from gravity and the contacts there.
 //
 // Cables do not see the spin phi of the shape about the base rod. A robot at rest does: the
 // endcaps on the ground are level, up . R_z(phi) (q_i - q_j) = 0.

@@ -2,6 +2,7 @@
 // sensor noise and bias priors explain.
 #pragma once
 
+#include <array>
 #include <cmath>
 
 #include "tensegrity/estimator/config.hpp"
@@ -17,6 +18,7 @@ struct AtRest {
   Vector3<Scalar> accel;         // mean specific force, IMU frame [m/s^2]
   int samples = 1;               // that were averaged
   CableLengths<Scalar> lengths;  // mean lengths [m]
+  std::array<bool, 6> contacts;  // endcaps on the ground; all false: not known
 };
 
 // The base rod of a belief at rest, with the priors of `config`: roll and pitch from the mean

@@ -150,7 +150,7 @@ class TightFilter {
         .setConstant(square(config_.ground_slope_std));
     flatness_ = tight::Flatness::kUndecided;
 
-    const SpinStart<Scalar> spin = stand(solver_.endcaps());
+    const SpinStart<Scalar> spin = stand(solver_.endcaps(), rest.contacts);
     const Endcaps<Scalar> h = spun(solver_.endcaps(), spin.angle);
     belief_.columns(2, 1) = robot_.endcap_radius - (belief_.rotation * h).row(2).minCoeff();
     tight::place_endcaps(belief_, h, kStartShapeStd, std::sqrt(spin.variance),
@@ -335,9 +335,9 @@ class TightFilter {
   }
 
   // phi from the endcaps that are on the ground. The ground may slope.
-  SpinStart<Scalar> stand(const Endcaps<Scalar>& q) const {
+  SpinStart<Scalar> stand(const Endcaps<Scalar>& q, const Flags& contacts) const {
     SpinStart<Scalar> spin =
-        find_spin(q, V3(belief_.rotation.transpose() * V3::UnitZ()), flags_,
+        find_spin(q, V3(belief_.rotation.transpose() * V3::UnitZ()), contacts,
                   std::hypot(kStartShapeStd, config_.ground_slope_std * robot_.rod_length / 2));
     if (!spin.found) spin.variance = square(config_.spin_prior_std);
     return spin;
