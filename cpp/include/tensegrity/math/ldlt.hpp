@@ -60,6 +60,18 @@ class Ldlt {
     return x;
   }
 
+  // The same for another b, with the factors there are.
+  Vector<Scalar, N> solve(const Vector<Scalar, N>& b) {
+#pragma GCC unroll 16
+    for (int j = 0; j < N; ++j) {
+      Scalar rest = b[j];
+#pragma GCC unroll 16
+      for (int k = 0; k < j; ++k) rest -= columns_(j, k) * (yd(k) * inverse_[k]);
+      columns_(kRight, j) = rest;
+    }
+    return solve();
+  }
+
   // B becomes B A^-1.
   void solve_below() {
     for (int j = N - 1; j >= 0; --j) {

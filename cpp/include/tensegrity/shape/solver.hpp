@@ -222,7 +222,8 @@ class Solver {
       const Scalar trial_cost = trial_residuals.cost();
       // Gauss-Newton as long as that makes much progress.
       now.newton = trial_cost > Scalar(0.1) * now.cost;
-      if (trial_cost < now.cost) {
+      const bool taken = trial_cost < now.cost;
+      if (taken) {
         now.rods = trial;
         now.cost = trial_cost;
         residuals = trial_residuals;
@@ -233,6 +234,21 @@ class Solver {
       if (length < options_.tolerance || now.cost < rounding_cost()) {
         now.converged = true;
         break;
+      }
+      // So close that the same factors do for the last step: what they miss is of second order.
+      if (taken && damping == 0 && length * length < options_.tolerance * prism_.rod_length / 10) {
+        step = -system.solve(residuals.gradient(now.rods));
+        if (step.norm() < options_.tolerance) {
+          trial = now.rods;
+          trial.retract(step);
+          const Scalar last_cost = LengthResiduals<Scalar>(trial, lengths).cost();
+          if (last_cost <= now.cost) {
+            now.rods = trial;
+            now.cost = last_cost;
+            now.converged = true;
+            break;
+          }
+        }
       }
     }
     return now;
