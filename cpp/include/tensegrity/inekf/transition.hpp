@@ -117,6 +117,7 @@ class Transition {
         row.add(variance, Packet<Scalar>(by[column] + j));
         return row;
       };
+      // Biases have no rows in A: the row of p_z, in a packet with theirs, is taken by itself.
       load(kReadRows);
       Packet<Scalar> p_z = x0;
       const Packet<Scalar> gx = noisy(x1, gyro_variance_, 0), gy = noisy(x2, gyro_variance_, 1),
@@ -164,10 +165,11 @@ class Transition {
   }
 
  private:
-  static constexpr int kBody = padded(kGyroBias);  // rows of the body
-  static constexpr int kReadRows = packet_start(kGyroBias);
-  static constexpr int kGroup = 3;  // packets of the group's rows at once
-  static_assert(kGyroBias % 4 == 1 && kAccelBias % 4 == 0 && kRotation == 0 && kVelocity == 3);
+  static constexpr int kBody = padded(kGyroBias);            // rows of the body
+  static constexpr int kReadRows = packet_start(kGyroBias);  // p_z and zeta_bg
+  static constexpr int kGroup = 3;                           // packets of the group's rows at once
+  static_assert(kGyroBias % 4 == 1 && kPosition + 3 == kGyroBias && kAccelBias % 4 == 0 &&
+                kRotation == 0 && kVelocity == 3);
   // Columns of A that are not zero: zeta_bg, and in the body's rows xi_Rx, xi_Ry, xi_v, zeta_ba.
   static constexpr int kByTilt = 3, kByVelocity = 5, kByAccel = 8, kColumns = 11;
 
