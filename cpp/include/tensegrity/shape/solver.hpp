@@ -235,10 +235,12 @@ class Solver {
         now.converged = true;
         break;
       }
-      // So close that the same factors do for the last step: what they miss is of second order.
+      // So close that the same factors may do for the last step: it shrinks the error as it is
+      // shorter than the one before, and leaves less than a hundredth of the tolerance.
+      const Scalar left = options_.tolerance / 100;
       if (taken && damping == 0 && length * length < options_.tolerance * prism_.rod_length / 10) {
         step = -system.solve(residuals.gradient(now.rods));
-        if (step.norm() < options_.tolerance) {
+        if (step.squaredNorm() < left * length) {
           trial = now.rods;
           trial.retract(step);
           const Scalar last_cost = LengthResiduals<Scalar>(trial, lengths).cost();
