@@ -220,8 +220,7 @@ class Solver {
       trial.retract(step);
       const LengthResiduals<Scalar> trial_residuals(trial, lengths);
       const Scalar trial_cost = trial_residuals.cost();
-      // Gauss-Newton as long as that makes much progress.
-      now.newton = trial_cost > Scalar(0.1) * now.cost;
+      now.newton = wants_newton(trial_cost, now.cost);
       const bool taken = trial_cost < now.cost;
       if (taken) {
         now.rods = trial;
@@ -245,6 +244,7 @@ class Solver {
           trial.retract(step);
           const Scalar last_cost = LengthResiduals<Scalar>(trial, lengths).cost();
           if (last_cost <= now.cost) {
+            now.newton = wants_newton(last_cost, now.cost);
             now.rods = trial;
             now.cost = last_cost;
             now.converged = true;
@@ -255,6 +255,9 @@ class Solver {
     }
     return now;
   }
+
+  // Gauss-Newton as long as that makes much progress.
+  static bool wants_newton(Scalar cost, Scalar before) { return cost > Scalar(0.1) * before; }
 
   // No single start may use up what the others need.
   static int start_limit(int limit, int iterations) {
