@@ -208,7 +208,7 @@ void check_drops_late_samples(const PrismConfig<double>& config) {
 
 // Cables and contacts ahead of the IMU wait for it; the step is split at their stamps.
 template <typename Estimator>
-void check_order_of_calls_does_not_matter(const PrismConfig<double>& config) {
+void check_calls_ahead_come_in_any_order(const PrismConfig<double>& config) {
   Shaken<double> early_world, late_world;
   Estimator early(early_world.robot, config), late(late_world.robot, config);
   early_world.run(early, 0, 600, true);
