@@ -234,26 +234,29 @@ class Solver {
         now.converged = true;
         break;
       }
-      // So close that the same factors may do for the last step: it shrinks the error as it is
-      // shorter than the one before, and leaves less than a hundredth of the tolerance.
-      const Scalar left = options_.tolerance / 100;
-      if (taken && damping == 0 && length * length < options_.tolerance * prism_.rod_length / 10) {
-        step = -system.solve(residuals.gradient(now.rods));
-        if (step.squaredNorm() < left * length) {
-          trial = now.rods;
-          trial.retract(step);
-          const Scalar last_cost = LengthResiduals<Scalar>(trial, lengths).cost();
-          if (last_cost <= now.cost) {
-            now.newton = wants_newton(last_cost, now.cost);
-            now.rods = trial;
-            now.cost = last_cost;
-            now.converged = true;
-            break;
-          }
-        }
-      }
+      if (taken && damping == 0 && finish(now, system, residuals, lengths, length)) break;
     }
     return now;
+  }
+
+  // After a step of `length`: so close that the same factors may do for the last one. It shrinks
+  // the error as it is shorter than the step before, and leaves less than a hundredth of the
+  // tolerance. False: it would not, and `now` is as it was.
+  bool finish(Solution& now, Ldlt<Scalar, kTangent>& system,
+              const LengthResiduals<Scalar>& residuals, const CableLengths<Scalar>& lengths,
+              Scalar length) const {
+    if (!(length * length < options_.tolerance * prism_.rod_length / 10)) return false;
+    const Tangent<Scalar> step = -system.solve(residuals.gradient(now.rods));
+    if (!(step.squaredNorm() < options_.tolerance / 100 * length)) return false;
+    Rods<Scalar> last = now.rods;
+    last.retract(step);
+    const Scalar cost = LengthResiduals<Scalar>(last, lengths).cost();
+    if (!(cost <= now.cost)) return false;
+    now.newton = wants_newton(cost, now.cost);
+    now.rods = last;
+    now.cost = cost;
+    now.converged = true;
+    return true;
   }
 
   // Gauss-Newton as long as that makes much progress.
