@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "ipopt_linear_solver.hpp"
 #include "tensegrity/shape/cables.hpp"
 #include "tensegrity/shape/gauge.hpp"
 #include "tensegrity/shape/solver.hpp"
@@ -253,19 +254,20 @@ class IpoptSolver::Problem : public Ipopt::TNLP {
 
 namespace {
 
-// Ipopt for one kind of start. It is built once: later solves keep its vectors and the symbolic
-// analysis of MUMPS, which no change of lengths changes.
+// Ipopt for one kind of start. It is built once: later solves keep its vectors and what was
+// analysed of the linear systems, which no change of lengths changes.
 class Application {
  public:
   Application(const IpoptOptions& options, bool warm) : ipopt_(new Ipopt::IpoptApplication(false)) {
     const auto set = ipopt_->Options();
     set->SetIntegerValue("print_level", 0);
     set->SetStringValue("sb", "yes");  // no banner
-    set->SetStringValue("linear_solver", "mumps");
+    set->SetStringValue("linear_solver", ipopt_linear_solver());
     set->SetNumericValue("tol", options.tolerance);
     set->SetIntegerValue("max_iter", options.max_iterations);
-    // Twelve variables need no tenfold work space for fill-in: taken from the system and given back
-    // at every factorisation, it costs more than the factorisation. Ipopt adds to it on demand.
+    // Where it has to be MUMPS: twelve variables need no tenfold work space for fill-in. Taken from
+    // the system and given back at every factorisation, it costs more than the factorisation; Ipopt
+    // adds to it on demand.
     set->SetIntegerValue("mumps_mem_percent", 10);
     // One solve a step, no residuals and refinement: the system is dense and well scaled.
     set->SetStringValue("fast_step_computation", "yes");
@@ -282,7 +284,7 @@ class Application {
       set->SetNumericValue(name, 1e-9);
     }
     if (ipopt_->Initialize("") != Ipopt::Solve_Succeeded) {
-      throw std::runtime_error("Ipopt could not be initialised; is its solver MUMPS installed?");
+      throw std::runtime_error("Ipopt could not be initialised");
     }
   }
 
