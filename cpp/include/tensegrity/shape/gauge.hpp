@@ -12,17 +12,33 @@
 
 namespace tensegrity::shape {
 
-// Angle about z by which `reference` has to be turned to fit `q` best over q2..q5 [rad], within
-// (-pi, pi]. Zero for every shape that is in the gauge of `reference`.
+// A turn about z.
 template <typename Scalar>
-Scalar spin_angle(const Endcaps<Scalar>& q, const Endcaps<Scalar>& reference) {
+struct Spin {
+  Scalar cosine, sine;
+
+  Scalar angle() const { return std::atan2(sine, cosine); }  // [rad], within (-pi, pi]
+};
+
+// The turn of `reference` that fits `q` best over q2..q5, none for every shape that is in the gauge
+// of `reference`. Without a trigonometric function: a solver asks for it after every solution.
+template <typename Scalar>
+Spin<Scalar> spin(const Endcaps<Scalar>& q, const Endcaps<Scalar>& reference) {
   Scalar sine = 0;
   Scalar cosine = 0;
   for (int i = 2; i < 6; ++i) {
     sine += reference(0, i) * q(1, i) - reference(1, i) * q(0, i);
     cosine += reference(0, i) * q(0, i) + reference(1, i) * q(1, i);
   }
-  return std::atan2(sine, cosine);
+  const Scalar radius = std::sqrt(sine * sine + cosine * cosine);
+  if (!(radius > 0)) return {Scalar(1), Scalar(0)};
+  return {cosine / radius, sine / radius};
+}
+
+// Its angle [rad], within (-pi, pi].
+template <typename Scalar>
+Scalar spin_angle(const Endcaps<Scalar>& q, const Endcaps<Scalar>& reference) {
+  return spin(q, reference).angle();
 }
 
 // q2..q5 turned about the body z axis by `angle` [rad]; q0 and q1 are on that axis.

@@ -75,7 +75,9 @@ class LengthResiduals {
   }
 
   // J' J, and with `second_order` the second derivatives of the lengths times the residuals as
-  // well, to the lower triangle of `h`; a unit stiffness holds the spin about z.
+  // well, to the lower triangle of `h`. The spin about z, t = `spin_by_angle`, is held by the
+  // stiffness t t' / (L/2)^2: which one does not matter, for it moves no solution, and this one is
+  // about as stiff as a cable.
   template <int Stride>
   void hessian(const Rods<Scalar>& rods, bool second_order, Columns<Scalar, Stride> h) const {
     // A cable resists along itself, and as it is tense also across.
@@ -120,9 +122,7 @@ class LengthResiduals {
     }
 
     const Tangent<Scalar> spin = spin_by_angle(rods);
-    Scalar squared = 0;
-    for (int k = 0; k < kTangent; ++k) squared += spin[k] * spin[k];
-    const Scalar unit = squared > 0 ? 1 / squared : Scalar(0);
+    const Scalar unit = 1 / (rods.half_length() * rods.half_length());
     const auto set = [&](int row, int column, Scalar value) {
       h[column][row] = value + unit * spin[row] * spin[column];
     };

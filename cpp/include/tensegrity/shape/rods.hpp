@@ -102,11 +102,16 @@ class Rods {
   }
 
   // Turns both free rods about the body z axis [rad]. Changes no cable length.
-  void rotate_about_z(Scalar angle) {
-    const Matrix3<Scalar> rotation = rotation_about_z(angle);
+  void rotate_about_z(Scalar angle) { rotate_about_z(std::cos(angle), std::sin(angle)); }
+  void rotate_about_z(Scalar cosine, Scalar sine) {
+    const auto turn = [&](auto&& v) {
+      const Scalar x = v[0], y = v[1];
+      v[0] = cosine * x - sine * y;
+      v[1] = sine * x + cosine * y;
+    };
     for (Rod& rod : rods_) {
-      rod.centre = rotation * rod.centre;
-      rod.frame = rotation * rod.frame;
+      turn(rod.centre);
+      for (int k = 0; k < 3; ++k) turn(rod.frame.col(k));
     }
   }
 

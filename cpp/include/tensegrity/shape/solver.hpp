@@ -4,7 +4,7 @@
 // lengths and the base rod are met by construction. Newton's method with the exact Hessian where
 // that is positive definite, else Gauss-Newton, both with Levenberg-Marquardt damping: close to the
 // fold (fold.hpp) noisy lengths often have no exact solution, and there Gauss-Newton alone does not
-// converge. The spin about z is held by a unit stiffness and removed by the Procrustes gauge.
+// converge. The spin about z is held by a stiffness and removed by the Procrustes gauge.
 //
 // Chirality (constraints.hpp) is not a constraint of the iteration but checked at its end: a
 // mirrored shape is reflected, a shape with crossed rods is started anew.
@@ -77,7 +77,8 @@ class Solver {
       if (best.cost == std::numeric_limits<Scalar>::max()) return Status::kWrongChirality;
     }
     rods_ = best.rods;
-    rods_.rotate_about_z(-spin_angle(rods_.endcaps(), reference_));
+    const Spin<Scalar> turn = spin(rods_.endcaps(), reference_);
+    rods_.rotate_about_z(turn.cosine, -turn.sine);
     endcaps_ = rods_.endcaps();
     cost_ = best.cost;
     iterations_ = iterations;
@@ -240,14 +241,14 @@ class Solver {
   }
 
   // After a step of `length`: so close that the same factors may do for the last one. It shrinks
-  // the error as it is shorter than the step before, and leaves less than a hundredth of the
+  // the error as it is shorter than the step before, and leaves less than a thousandth of the
   // tolerance. False: it would not, and `now` is as it was.
   bool finish(Solution& now, Ldlt<Scalar, kTangent>& system,
               const LengthResiduals<Scalar>& residuals, const CableLengths<Scalar>& lengths,
               Scalar length) const {
     if (!(length * length < options_.tolerance * prism_.rod_length / 10)) return false;
     const Tangent<Scalar> step = -system.solve(residuals.gradient(now.rods));
-    if (!(step.squaredNorm() < options_.tolerance / 100 * length)) return false;
+    if (!(step.squaredNorm() < options_.tolerance / 1000 * length)) return false;
     Rods<Scalar> last = now.rods;
     last.retract(step);
     const Scalar cost = LengthResiduals<Scalar>(last, lengths).cost();
