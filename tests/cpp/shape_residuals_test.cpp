@@ -17,7 +17,7 @@ TEST_CASE("cost, gradient and Hessian of the residuals") {
     const LengthResiduals<double> residuals(rods, measured);
     const CableLengths<double> r = lengths - measured;
     const LengthJacobian<double> jacobian = length_jacobian(rods);
-    const Tangent<double> spin = spin_by_angle(rods) / rods.half_length();
+    const Tangent<double> spin = spin_tangent(rods);
     CHECK(residuals.cost() == doctest::Approx(r.squaredNorm()).epsilon(1e-12));
     CHECK((residuals.gradient(rods) - jacobian.transpose() * r).norm() < 1e-12);
 

@@ -75,11 +75,19 @@ class LengthResiduals {
   }
 
   // J' J, and with `second_order` the second derivatives of the lengths times the residuals as
-  // well, to the lower triangle of `h`. The spin about z, t = `spin_by_angle`, is held by the
-  // stiffness t t' / (L/2)^2: which one does not matter, for it moves no solution, and this one is
-  // about as stiff as a cable.
+  // well, to the lower triangle of `h`; a unit stiffness holds the spin about z.
   template <int Stride>
   void hessian(const Rods<Scalar>& rods, bool second_order, Columns<Scalar, Stride> h) const {
+    // First, and in two halves: all that follows waits for the division.
+    const Tangent<Scalar> spin = spin_by_angle(rods);
+    const auto squares = [&](int rod) {
+      const int at = 5 * rod;
+      return (spin[at] * spin[at] + spin[at + 1] * spin[at + 1]) +
+             (spin[at + 3] * spin[at + 3] + spin[at + 4] * spin[at + 4]);
+    };
+    const Scalar squared = squares(0) + squares(1);
+    const Scalar unit = squared > 0 ? 1 / squared : Scalar(0);
+
     // A cable resists along itself, and as it is tense also across.
     // (A structured binding would not do: in C++17 no lambda may capture it.)
     const Lanes &x = directions_[0], &y = directions_[1], &z = directions_[2];
@@ -121,8 +129,6 @@ class LengthResiduals {
       }
     }
 
-    const Tangent<Scalar> spin = spin_by_angle(rods);
-    const Scalar unit = 1 / (rods.half_length() * rods.half_length());
     const auto set = [&](int row, int column, Scalar value) {
       h[column][row] = value + unit * spin[row] * spin[column];
     };

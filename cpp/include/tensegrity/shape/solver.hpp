@@ -4,7 +4,7 @@
 // lengths and the base rod are met by construction. Newton's method with the exact Hessian where
 // that is positive definite, else Gauss-Newton, both with Levenberg-Marquardt damping: close to the
 // fold (fold.hpp) noisy lengths often have no exact solution, and there Gauss-Newton alone does not
-// converge. The spin about z is held by a stiffness and removed by the Procrustes gauge.
+// converge. The spin about z is held by a unit stiffness and removed by the Procrustes gauge.
 //
 // Chirality (constraints.hpp) is not a constraint of the iteration but checked at its end: a
 // mirrored shape is reflected, a shape with crossed rods is started anew.
