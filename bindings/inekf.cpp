@@ -20,7 +20,9 @@ struct FilterNoise {
 
 RowVectors anchors(const Belief& b) { return b.anchors.leftCols(b.anchor_count).transpose(); }
 
-Eigen::MatrixXd covariance(const Belief& b) { return b.covariance.topLeftCorner(b.dim(), b.dim()); }
+Eigen::MatrixXd covariance(const Belief& b) {
+  return b.complete_covariance().topLeftCorner(b.dim(), b.dim());
+}
 
 void set_covariance(Belief& b, const Eigen::MatrixXd& p) {
   if (p.rows() != b.dim() || p.cols() != b.dim()) {

@@ -135,8 +135,8 @@ TEST_CASE("columns, outer products and mirrors of part of a covariance") {
     CHECK((columns - expected).norm() < 1e-14);
 
     columns = p;
-    tensegrity::add_columns(columns, 0, 9, m, 8, size, 0);
-    expected.middleRows<4>(4) = p.middleRows<4>(4);
+    tensegrity::add_columns(columns, 0, 9, m, 8, size);
+    expected.topRows<8>() = p.topRows<8>();
     CHECK((columns - expected).norm() < 1e-14);
 
     P rows = p;
@@ -161,8 +161,8 @@ TEST_CASE("columns, outer products and mirrors of part of a covariance") {
       P reduced = p;
       tensegrity::subtract_outer(reduced, w, count, size);
       const Eigen::MatrixXd used = w.leftCols(count);
+      tensegrity::mirror(reduced, size);
       CHECK((reduced - (p - used * used.transpose())).norm() < 1e-13);
-      CHECK((reduced - reduced.transpose()).norm() == 0);
     }
   }
 }

@@ -25,7 +25,7 @@ template <typename Scalar, int Extra, int Anchors>
 void check_valid(const inekf::Belief<Scalar, Extra, Anchors>& belief) {
   REQUIRE(belief.finite());
   const int n = belief.dim();
-  check_covariance(belief.covariance.topLeftCorner(n, n).template cast<double>(),
+  check_covariance(belief.complete_covariance().topLeftCorner(n, n).template cast<double>(),
                    double(std::numeric_limits<Scalar>::epsilon()));
 }
 template <typename Scalar>

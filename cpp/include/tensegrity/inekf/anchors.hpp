@@ -14,6 +14,7 @@ template <typename B, typename Scalar = typename B::Scalar>
 bool augment(B& belief, int id, const Vector3<Scalar>& h,
              const Matrix<Scalar, 3, B::Extra>& h_extra, const Matrix3<Scalar>& h_covariance) {
   if (belief.anchor_count == B::MaxAnchors || belief.find(id) >= 0) return false;
+  belief.complete();
   auto& p = belief.covariance;
   const int n = belief.dim();
   const int at = B::anchor_index(belief.anchor_count);

@@ -34,7 +34,8 @@ struct Belief {
   static constexpr int kAnchors = 15 + Extra;
   static constexpr int MaxDim = kAnchors + 3 * MaxAnchors;
 
-  // Only the leading dim() x dim() block is meaningful, the rest is zero.
+  // Of the leading dim() x dim() block, what is on and below the diagonal; beyond it all is zero.
+  // What is above the diagonal is scratch, up to date only after `complete`.
   using Covariance = Matrix<Scalar, padded(MaxDim)>;
   using ErrorVector = Vector<Scalar, padded(MaxDim)>;
 
@@ -91,6 +92,14 @@ struct Belief {
     extra -= e.template segment<Extra>(kExtra);
   }
 
+  // Copies what is below the covariance's diagonal to above it.
+  void complete() { mirror(covariance, padded(dim())); }
+  Covariance complete_covariance() const {
+    Covariance p = covariance;
+    mirror(p, padded(dim()));
+    return p;
+  }
+
   bool finite() const {
     const int n = dim();
     return rotation.allFinite() && velocity.allFinite() && position.allFinite() &&
@@ -107,9 +116,7 @@ struct Belief {
     return column_covariance(covariance, velocity, kVelocity);
   }
   // Covariance of the rotation error in the world frame [rad^2].
-  Matrix3<Scalar> rotation_covariance() const {
-    return covariance.template block<3, 3>(kRotation, kRotation);
-  }
+  Matrix3<Scalar> rotation_covariance() const { return symmetric_block(covariance, kRotation); }
 };
 
 }  // namespace tensegrity::inekf

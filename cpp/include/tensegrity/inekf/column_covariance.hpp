@@ -5,6 +5,12 @@
 
 namespace tensegrity::inekf {
 
+// The block of three on the diagonal at `at`, of which the lower triangle is read.
+template <typename Covariance>
+Matrix3<typename Covariance::Scalar> symmetric_block(const Covariance& covariance, int at) {
+  return covariance.template block<3, 3>(at, at).template selfadjointView<Eigen::Lower>();
+}
+
 // Covariance of the world error of a column x (a velocity or a position) whose invariant error xi_x
 // starts at `at` of `covariance`, with that of the rotation first: dx = xi_x - x x xi_R.
 template <typename Covariance, typename Column>
@@ -12,8 +18,8 @@ auto column_covariance(const Covariance& covariance, const Column& column, int a
   using M3 = Matrix3<typename Covariance::Scalar>;
   const M3 c = hat(column);
   const M3 cross = covariance.template block<3, 3>(at, 0) * c.transpose();
-  return M3(covariance.template block<3, 3>(at, at) - cross - cross.transpose() +
-            c * covariance.template block<3, 3>(0, 0) * c.transpose());
+  return M3(symmetric_block(covariance, at) - cross - cross.transpose() +
+            c * symmetric_block(covariance, 0) * c.transpose());
 }
 
 }  // namespace tensegrity::inekf

@@ -39,7 +39,7 @@ struct Kinematics {
 };
 
 // All anchored endcaps in one measurement: their errors are correlated through the shape.
-// `Contacts` is the belief's anchor_count.
+// `Contacts` is the belief's anchor_count; its covariance is read by whole columns, i.e. complete.
 template <int Contacts, typename B, int N, typename Scalar = typename B::Scalar>
 void contact_innovation(const B& belief, const Kinematics<Scalar, N, B::Extra>& k,
                         Innovation<B, 3 * Contacts, Contacts>& z) {
@@ -99,6 +99,7 @@ Correction<Scalar> correct_contacts(B& belief, const Kinematics<Scalar, N, B::Ex
                                     Scalar gate) {
   if (belief.anchor_count == Contacts) {
     Innovation<B, 3 * Contacts, Contacts> z;
+    belief.complete();
     contact_innovation(belief, k, z);
     return correct(belief, z, gate);
   }

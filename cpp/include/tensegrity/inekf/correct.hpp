@@ -31,7 +31,7 @@ struct Correction {
 };
 
 // Applies the update unless z' S^-1 z exceeds `gate` (0: no gate). On kRejected or kNotFinite the
-// belief is as it was. Uses the innovation up.
+// belief is as it was. Uses the innovation up. Only the lower triangle of P is read and written.
 //
 // With S = L D L', y = L^-1 z and W = P H' L^-T: e = W D^-1 y and P <- P - W D^-1 W'.
 template <typename B, int Rows, int Anchors, typename Scalar = typename B::Scalar>

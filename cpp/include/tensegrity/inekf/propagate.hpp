@@ -35,25 +35,37 @@ void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravit
   const Strapdown<Scalar> body =
       integrate(belief.rotation, belief.velocity, belief.position, motion, dt, gravity);
 
+  // Contact points begin in this row, or up to three after it; of the columns before it, and of the
+  // body's, the part above the diagonal is read.
+  constexpr int kGroup = packet_start(B::kAnchors), kBody = std::max(padded(B::kExtra), kGroup);
   auto& p = belief.covariance;
   const int n = belief.dim(), rows = padded(n);
   const int anchors = belief.anchor_count;
   const V3 up = V3::UnitZ();
-  const bool rolls = rolling.radius > 0;
 
-  // ---- P F'
   // Contact points: d+ = d + r turn x e_z, and the touching point d - r e_z is what turns with R,
   //   xi_d+ = xi_d + r turn x (e_z x xi_R) - int (d - r e_z) x R zeta_g
-  M3 anchor_by_rotation;
-  if (rolls) {
+  // The first of the two, by itself: no other error sees it in this step.
+  if (rolling.radius > 0) {
     // Integral of R w: w is an eigenvector of Exp(w t).
     const V3 turn = belief.rotation * motion.gyro * dt;
     belief.anchors.leftCols(anchors).colwise() += rolling.radius * turn.cross(up);
-    anchor_by_rotation = rolling.radius * hat(turn) * hat(up);
+    const M3 by_rotation = rolling.radius * hat(turn) * hat(up);
+    belief.complete();
     for (int i = 0; i < anchors; ++i) {
-      add_columns(p, B::anchor_index(i), B::kRotation, anchor_by_rotation, 0, rows);
+      add_columns(p, B::anchor_index(i), B::kRotation, by_rotation, 0, rows);
     }
+    for (int j = 0; j < n; ++j) {
+      const V3 rolled = by_rotation * p.col(j).template head<3>();
+      for (int i = 0; i < anchors; ++i) {
+        p.col(j).template segment<3>(B::anchor_index(i)) += rolled;
+      }
+    }
+  } else {
+    mirror(p, kBody);
   }
+
+  // ---- P F'
   Transition<Scalar, B::Covariance::RowsAtCompileTime> transition(body, noise.gyro, noise.accel,
                                                                   rows);
   for (int i = 0; i < anchors; ++i) {
@@ -61,19 +73,10 @@ void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravit
     transition.set_group(B::anchor_index(i), body.column_by_gyro(Packet<Scalar>(touching)));
   }
   transition.body_columns(p, rows);
-  for (int i = 0; i < anchors; ++i) {
-    const int at = B::anchor_index(i);
-    transition.group_columns(p, at, rolls ? 0 : packet_start(at), rows);
-  }
+  for (int i = 0; i < anchors; ++i) transition.group_columns(p, B::anchor_index(i), rows);
 
-  // ---- F (P F'): rows from the diagonal on
-  for (int j = 0; rolls && j < n; ++j) {
-    const V3 rolled = anchor_by_rotation * p.col(j).template head<3>();
-    for (int i = 0; i < anchors; ++i) {
-      p.col(j).template segment<3>(B::anchor_index(i)) += rolled;
-    }
-  }
-  transition.all_rows(p, packet_start(B::kAnchors), rows);
+  // ---- F (P F')
+  transition.all_rows(p, kGroup, rows);
 
   const auto walk = [&](int at, int size, Scalar std) {
     for (int k = at; k < at + size; ++k) p(k, k) += std * std * dt;
@@ -82,7 +85,6 @@ void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravit
   walk(B::kAccelBias, 3, noise.accel_bias);
   for (int k = 0; k < B::Extra; ++k) walk(B::kExtra + k, 1, extra_walk[k]);
   walk(B::kAnchors, 3 * anchors, noise.anchor);
-  mirror(p, rows);
 }
 
 }  // namespace tensegrity::inekf

@@ -87,15 +87,15 @@ class Transition {
     for (int k = 0; k < 3; ++k) m[std::size_t(k)].store(&by_(at, k));
   }
 
-  // P F': columns at .. at + 2 of the group. Rows from `first` on, and those that `all_rows` reads.
+  // P F': columns at .. at + 2 of the group, from the diagonal on.
   template <typename P>
-  void group_columns(P& covariance, int at, int first, int rows) const {
-    add_columns(covariance, at, kGyroBias, by_.template block<3, 3>(at, 0), first, rows,
-                first > kReadRows ? kReadRows : -1);
+  void group_columns(P& covariance, int at, int rows) const {
+    add_columns(covariance, at, kGyroBias, by_.template block<3, 3>(at, 0), packet_start(at), rows);
   }
 
   // F (P F') and the noise of the sample, from the diagonal on. Rows of the group after the body's
-  // begin at `group`, a multiple of four; all end at `rows`.
+  // begin at `group`, a multiple of four; all end at `rows`. What is above the diagonal is only
+  // read before `group`.
   template <typename P>
   void all_rows(P& covariance, int group, int rows) const {
     const auto p = columns(covariance);
@@ -103,7 +103,7 @@ class Transition {
     // Rows of P F' that A has columns for: for the body's, and of zeta_bg.
     alignas(4 * sizeof(Scalar)) Scalar seen[kColumns][4];
     alignas(4 * sizeof(Scalar)) Scalar gyro[3][Rows];
-    for (int j = 0; j < rows; j += 4) {
+    for (int j = 0; j < group; j += 4) {
       const auto own = p.from_column(j);
       Packet<Scalar> x0, x1, x2, x3;
       const auto load = [&](int at) {
@@ -147,6 +147,23 @@ class Transition {
       for (int c = 0; c < 4; ++c) own[c][kReadRows] = p_z.at(c);
       if (j < kReadRows) {
         add_product<false>(own, by, Columns<const Scalar, 4>{seen[0]}, kColumns, j, kReadRows);
+      }
+    }
+    // The rows of zeta_bg in the columns of the group, from the rows of the group: P F' and P agree
+    // in the columns of zeta_bg.
+    Scalar bias[3][3];
+    for (int k = 0; k < 3; ++k) {
+      for (int l = 0; l < 3; ++l) bias[k][l] = p[kGyroBias + k][kGyroBias + l];
+      bias[k][k] += gyro_variance_;
+    }
+    for (int j = group; j < rows; j += 4) {
+      const Packet<Scalar> a0(by[0] + j), a1(by[1] + j), a2(by[2] + j);
+      for (int k = 0; k < 3; ++k) {
+        Packet<Scalar> row(p[kGyroBias + k] + j);
+        row.add(bias[k][0], a0);
+        row.add(bias[k][1], a1);
+        row.add(bias[k][2], a2);
+        row.store(gyro[k] + j);
       }
     }
     const Columns<const Scalar, Rows> errors{gyro[0]};

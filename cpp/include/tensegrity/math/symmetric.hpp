@@ -1,8 +1,8 @@
 // What a filter does to its covariance all day, written for the columns of a matrix in memory.
 //
-// A covariance is stored in full, so that any of its columns can be read at once, but computed in
-// its lower triangle. Loops run over whole packets of four rows: matrices here have a multiple of
-// four rows (`padded`), and are zero beyond their active size.
+// A covariance is computed in its lower triangle, and stored in full, so that any of its columns
+// can be read at once after a `mirror`. Loops run over whole packets of four rows: matrices here
+// have a multiple of four rows (`padded`), and are zero beyond their active size.
 #pragma once
 
 #include "tensegrity/math/packet.hpp"
@@ -11,10 +11,10 @@
 namespace tensegrity {
 
 // Columns `to` .. `to + 2` of P get those of `from` times m': P <- P (I + m at rows `to`, columns
-// `from`)'. Rows `first` to `end` (multiples of four), and with `also` >= 0 the four from there.
+// `from`)'. Rows `first` to `end` (multiples of four).
 template <typename Derived, typename Block>
 void add_columns(Eigen::MatrixBase<Derived>& p, int to, int from, const Eigen::MatrixBase<Block>& m,
-                 int first, int end, int also = -1) {
+                 int first, int end) {
   using Scalar = typename Derived::Scalar;
   constexpr int kStride = Derived::RowsAtCompileTime;
   Scalar* target = &p.derived().coeffRef(0, to);
@@ -23,7 +23,7 @@ void add_columns(Eigen::MatrixBase<Derived>& p, int to, int from, const Eigen::M
   const Scalar m00 = m(0, 0), m01 = m(0, 1), m02 = m(0, 2);
   const Scalar m10 = m(1, 0), m11 = m(1, 1), m12 = m(1, 2);
   const Scalar m20 = m(2, 0), m21 = m(2, 1), m22 = m(2, 2);
-  const auto add = [&](int i) {
+  for (int i = first; i < end; i += 4) {
     const Packet<Scalar> a(source + i), b(source + i + kStride), c(source + i + 2 * kStride);
     Packet<Scalar> x(target + i), y(target + i + kStride), z(target + i + 2 * kStride);
     x.add(m00, a), y.add(m10, a), z.add(m20, a);
@@ -32,9 +32,7 @@ void add_columns(Eigen::MatrixBase<Derived>& p, int to, int from, const Eigen::M
     x.store(target + i);
     y.store(target + i + kStride);
     z.store(target + i + 2 * kStride);
-  };
-  if (also >= 0) add(also);
-  for (int i = first; i < end; i += 4) add(i);
+  }
 }
 
 // The same with m = factor I, all rows up to `end`.
@@ -227,7 +225,8 @@ void add_rows(Columns<Scalar, P> p, Columns<const Scalar, A> a, Columns<const Sc
   }
 }
 
-// P <- P - W W' with the first `count` columns of W, on the first `size` rows and columns.
+// P <- P - W W' with the first `count` columns of W, in the lower triangle of the first `size` rows
+// and columns.
 template <typename P, typename W>
 void subtract_outer(Eigen::MatrixBase<P>& p, const Eigen::MatrixBase<W>& w, int count, int size) {
   static_assert(P::RowsAtCompileTime % 4 == 0 && W::RowsAtCompileTime % 4 == 0, "whole packets");
@@ -236,7 +235,6 @@ void subtract_outer(Eigen::MatrixBase<P>& p, const Eigen::MatrixBase<W>& w, int 
   for (int j = 0; count > 0 && j < size; j += 4) {
     add_product<true>(to.from_column(j), from, from.from(j), count, j, size);
   }
-  mirror(p, size);
 }
 
 }  // namespace tensegrity

@@ -40,7 +40,7 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
     const int at = B::column_index(c);
     if (at < B::kRates) add_columns(p, at, B::kRates + (at - B::kEndcaps), dt, B::Dim);
     transition.set_group(at, body.column_by_gyro(Packet<Scalar>(x.col(c))));
-    transition.group_columns(p, at, packet_start(at), B::Dim);
+    transition.group_columns(p, at, B::Dim);
   }
   transition.body_columns(p, B::Dim);
 

@@ -84,6 +84,7 @@ class SequentialUpdate {
       crosses_.col(k) *= std::sqrt(row.information * row.inverse_variance);
     }
     subtract_outer(belief_.covariance, crosses_, waiting_, B::Dim);
+    mirror(belief_.covariance, B::Dim);
     waiting_ = 0;
   }
 
