@@ -76,7 +76,7 @@ void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravit
   for (int i = 0; i < anchors; ++i) transition.group_columns(p, B::anchor_index(i), rows);
 
   // ---- F (P F')
-  transition.all_rows(p, kGroup, rows);
+  transition.all_rows(p, kGroup, n);
 
   const auto walk = [&](int at, int size, Scalar std) {
     for (int k = at; k < at + size; ++k) p(k, k) += std * std * dt;

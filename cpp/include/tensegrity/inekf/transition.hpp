@@ -94,10 +94,11 @@ class Transition {
   }
 
   // F (P F') and the noise of the sample, from the diagonal on. Rows of the group after the body's
-  // begin at `group`, a multiple of four; all end at `rows`. What is above the diagonal is only
-  // read before `group`.
+  // begin at `group`, a multiple of four; all end at `end`. What is above the diagonal is only read
+  // before `group`.
   template <typename P>
-  void all_rows(P& covariance, int group, int rows) const {
+  void all_rows(P& covariance, int group, int end) const {
+    const int rows = padded(end);
     const auto p = columns(covariance);
     const auto by = columns(by_);
     // Rows of P F' that A has columns for: for the body's, and of zeta_bg.
@@ -172,11 +173,11 @@ class Transition {
       const auto rest = p.from(row);
       const auto a = by.from(row);
       if (left >= kGroup) {
-        add_rows<kGroup>(rest, a, errors, row + 4 * kGroup);
+        add_rows<kGroup>(rest, a, errors, std::min(row + 4 * kGroup, end));
       } else if (left == 2) {
-        add_rows<2>(rest, a, errors, rows);
+        add_rows<2>(rest, a, errors, end);
       } else {
-        add_rows<1>(rest, a, errors, rows);
+        add_rows<1>(rest, a, errors, end);
       }
     }
   }

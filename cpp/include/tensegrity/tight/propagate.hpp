@@ -48,7 +48,7 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   for (int j = 0; j < B::kRates; ++j) {
     p.col(j).template segment<12>(B::kEndcaps) += dt * p.col(j).template segment<12>(B::kRates);
   }
-  transition.all_rows(p, packet_start(B::kEndcaps), kGroupEnd);
+  transition.all_rows(p, packet_start(B::kEndcaps), B::kOffsets);
 
   // ---- walks of the step
   const auto walk = [&](int at, int size, Scalar std) {
