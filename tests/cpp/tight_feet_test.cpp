@@ -106,6 +106,7 @@ TEST_CASE("feet: rows of the slip are its derivative but for rolling's dependenc
         const VectorXd expected = (numeric - left_out).transpose() * direction;
         CHECK((dense(foot.along(direction)) - expected).norm() < kTolerance);
       }
+      CHECK((dense(foot.rise()) - dense(foot.along(n))).norm() < 1e-14);
     }
   }
 }

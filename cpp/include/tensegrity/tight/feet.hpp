@@ -21,52 +21,72 @@ class Foot {
  public:
   using B = Belief<Scalar>;
   using V3 = Vector3<Scalar>;
-  using M3 = Matrix3<Scalar>;
 
-  // `spin`: rate of a free rod about its own axis [rad/s], NaN: not measured.
+  // `spin`: rate of a free rod about its own axis, toward its even endcap [rad/s], NaN: not
+  // measured.
   Foot(const B& belief, int endcap, Scalar radius, Scalar rod_length, const V3& normal,
        Scalar spin = std::numeric_limits<Scalar>::quiet_NaN())
-      : even_(endcap / 2 * 2), base_(endcap < 2) {
-    const M3& rotation = belief.rotation;
-    if (base_) {
-      const V3 arm = belief.base[std::size_t(endcap)];
-      slip_ = belief.endcap_velocity(endcap) - radius * (rotation * belief.rate).cross(normal);
-      by_gyro_bias_ = rotation * hat(arm) - radius * hat(normal) * rotation;
-      by_even_ = M3::Identity();  // of v
+      : endcap_(endcap), normal_(normal), to_body_(belief.rotation.transpose()) {
+    const V3 base_rate = belief.rotation * belief.rate;
+    slip_ = belief.endcap_velocity(endcap);
+    if (base()) {
+      slip_ -= radius * base_rate.cross(normal);
+      arm_ = radius * (to_body_ * normal) - belief.base[std::size_t(endcap)];
       return;
     }
-    const V3 u = (belief.endcap(even_) - belief.endcap(even_ + 1)).normalized();
-    const V3 turn =
-        (belief.endcap_velocity(even_) - belief.endcap_velocity(even_ + 1)) / rod_length;
+    const int other = endcap ^ 1;
+    axis_ = (belief.endcap(endcap) - belief.endcap(other)).normalized();
+    const V3 turn = (slip_ - belief.endcap_velocity(other)) / rod_length;
     // (u x turn) x n = turn (u . n) - u (turn . n)
-    const V3 about = u.cross(normal);
-    const bool measured = !std::isnan(spin);
-    const Scalar about_itself = measured ? spin : u.dot(rotation * belief.rate);
-    slip_ = belief.endcap_velocity(endcap) -
-            radius * (turn * u.dot(normal) - u * turn.dot(normal) + about_itself * about);
-    by_even_ = -(radius / rod_length) * (u.dot(normal) * M3::Identity() - u * normal.transpose());
-    by_odd_ = -by_even_;
-    (endcap == even_ ? by_even_ : by_odd_) += M3::Identity();
-    if (!measured) by_gyro_bias_ = radius * about * (u.transpose() * rotation);
+    about_ = axis_.cross(normal);
+    by_gyro_ = std::isnan(spin);
+    const Scalar about_itself = by_gyro_ ? axis_.dot(base_rate) : endcap < other ? spin : -spin;
+    slip_ -= radius * (turn * axis_.dot(normal) - axis_ * turn.dot(normal) + about_itself * about_);
+    rolling_ = radius / rod_length;
+    arm_ = radius * (to_body_ * axis_);
   }
 
   // Velocity of the touching point, world [m/s].
   const V3& slip() const { return slip_; }
 
-  // Row of slip . direction.
-  Row<Scalar> along(const V3& direction) const {
+  // Row of slip . d.
+  Row<Scalar> along(const V3& d) const {
     Row<Scalar> row;
-    row.add(B::endcap_velocity_index(even_), by_even_.transpose() * direction);
-    if (!base_) row.add(B::endcap_velocity_index(even_ + 1), by_odd_.transpose() * direction);
-    row.add(B::kGyroBias, by_gyro_bias_.transpose() * direction);
+    if (base()) {
+      // d . (R hat(b) - r hat(n) R) = ((r R' n - b) x R' d)'
+      row.add(B::kVelocity, d);
+      row.add(B::kGyroBias, arm_.cross(to_body_ * d));
+      return row;
+    }
+    // Of its own velocity the rod's turn takes r/L ((u . n) d - (u . d) n), of the other's as much
+    // with the other sign.
+    const V3 other = rolling_ * (axis_.dot(normal_) * d - axis_.dot(d) * normal_);
+    row.add(B::endcap_velocity_index(endcap_), d - other);
+    row.add(B::endcap_velocity_index(endcap_ ^ 1), other);
+    if (by_gyro_) row.add(B::kGyroBias, about_.dot(d) * arm_);
+    return row;
+  }
+  // Row of slip . n: across the plane the touching point of a free rod moves as its endcap does.
+  Row<Scalar> rise() const {
+    if (base()) return along(normal_);
+    Row<Scalar> row;
+    row.add(B::endcap_velocity_index(endcap_), normal_);
     return row;
   }
 
  private:
-  int even_;
-  bool base_;
+  bool base() const { return endcap_ < 2; }
+
+  int endcap_;
+  V3 normal_;
+  Matrix3<Scalar> to_body_;  // R'
   V3 slip_;
-  M3 by_even_ = M3::Zero(), by_odd_ = M3::Zero(), by_gyro_bias_ = M3::Zero();
+  V3 arm_;  // of the base rod r R' n - b, of a free one r R' u
+  // Of a free rod: its direction u toward this endcap, u x n, r/L, and whether the base rod's gyro
+  // stands for its spin.
+  V3 axis_, about_;
+  Scalar rolling_;
+  bool by_gyro_;
 };
 
 // Height of a touching endcap above the ground plane, along (-m1, -m2, 1): zero [m].

@@ -81,7 +81,7 @@ FootResult<Scalar> correct_foot(SequentialUpdate<Scalar>& update, const Belief<S
 
   const Scalar belief_in_contact = std::min(std::max(3 * share, Scalar(0.005)), Scalar(1));
   const Scalar trust = dt * belief_in_contact * belief_in_contact;
-  update.correct(foot.along(normal), rise, noise.rise * noise.rise / trust);
+  update.correct(foot.rise(), rise, noise.rise * noise.rise / trust);
   const Scalar above = height(belief, endcap, robot.endcap_radius);
   const Scalar chi_square =
       update.correct(height_row(belief, endcap), above, noise.height * noise.height / trust);
