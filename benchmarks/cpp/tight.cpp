@@ -83,9 +83,11 @@ struct Rig {
     const tight::FootNoise<Scalar> noise{config.creep_std,       config.slip_length,
                                          config.slip_speed,      config.foot_rise_std,
                                          config.foot_height_std, config.friction};
+    const tight::Ground<Scalar> ground(belief);
     tight::SequentialUpdate<Scalar> update(belief);
     for (int endcap = 1; endcap < 6; endcap += 2) {
-      tight::correct_foot(update, belief, endcap, shares[std::size_t(endcap)], robot, noise, dt);
+      tight::correct_foot(update, belief, ground, endcap, shares[std::size_t(endcap)], robot, noise,
+                          dt);
     }
   }
 

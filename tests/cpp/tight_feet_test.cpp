@@ -11,17 +11,24 @@ namespace {
 
 using namespace tensegrity::tight::test;
 using tensegrity::hat;
+using tensegrity::Packet;
 using tensegrity::Prism;
 using tensegrity::tight::Foot;
-using tensegrity::tight::Row;
+using tensegrity::tight::FootRows;
+using tensegrity::tight::Ground;
 using M3 = tensegrity::Matrix3<double>;
 
 constexpr int kSeeds = 20;
 constexpr double kTolerance = 20 * kDerivativeError;  // norms of vectors of some twenty entries
 
-VectorXd dense(const Row<double>& row) {
+// The row `k` of them.
+VectorXd dense(const FootRows<double>& rows, int k) {
   VectorXd h(B::Dim);
-  for (int k = 0; k < B::Dim; ++k) h[k] = row.times(VectorXd(VectorXd::Unit(B::Dim, k)).data());
+  for (int i = 0; i < B::Dim; ++i) {
+    Packet<double> column;
+    rows.times<1>(VectorXd(VectorXd::Unit(B::Dim, i)).data(), &column);
+    h[i] = column.at(k);
+  }
   return h;
 }
 
@@ -43,6 +50,11 @@ V3 touching_velocity(const B& belief, int endcap, const Prism<double>& robot, co
   return belief.endcap_velocity(endcap) + omega.cross(-robot.endcap_radius * n);
 }
 
+double height(const B& belief, int endcap, const Prism<double>& robot) {
+  const Ground<double> ground(belief);
+  return Foot<double>(belief, ground, endcap, robot.endcap_radius, robot.rod_length).height();
+}
+
 }  // namespace
 
 TEST_CASE("feet: the slip is that of the touching point of a rolling sphere") {
@@ -51,10 +63,11 @@ TEST_CASE("feet: the slip is that of the touching point of a rolling sphere") {
     Samples samples(seed);
     const B belief = samples.belief(robot);
     const V3 n = belief.ground_normal();
+    const Ground<double> ground(belief);
     for (int endcap = 0; endcap < 6; ++endcap) {
       for (const double spin : {kUnmeasured, 0.0, 1.7}) {
-        const Foot<double> foot(belief, endcap, robot.endcap_radius, robot.rod_length, n, spin);
-        CHECK((foot.slip() - touching_velocity(belief, endcap, robot, n, spin)).norm() < 1e-12);
+        const Foot<double> foot(belief, ground, endcap, robot.endcap_radius, robot.rod_length, spin);
+        CHECK((vector(foot.slip()) - touching_velocity(belief, endcap, robot, n, spin)).norm() < 1e-12);
       }
     }
   }
@@ -74,10 +87,11 @@ TEST_CASE("feet: rows of the slip are its derivative but for rolling's dependenc
     Samples samples(seed);
     const B belief = samples.belief(robot);
     const V3 n = belief.ground_normal();
+    const Ground<double> ground(belief);
     const V3 base_rate = belief.rotation * belief.rate;
     for (int endcap = 0; endcap < 6; ++endcap) {
       const double spin = samples.uniform(0, 1) < 0.5 ? kUnmeasured : samples.normal();
-      const Foot<double> foot(belief, endcap, r, robot.rod_length, n, spin);
+      const Foot<double> foot(belief, ground, endcap, r, robot.rod_length, spin);
       const MatrixXd numeric = derivative(belief, [&](const B& b) {
         return VectorXd(touching_velocity(b, endcap, robot, n, spin));
       });
@@ -99,14 +113,18 @@ TEST_CASE("feet: rows of the slip are its derivative but for rolling's dependenc
         left_out.middleCols<3>(B::endcap_index(even)) = by_direction * across;
         left_out.middleCols<3>(B::endcap_index(even + 1)) = -by_direction * across;
       }
-      left_out.middleCols<3>(B::kRotation) = -hat(foot.slip()) - r * hat(omega) * hat(n);
+      left_out.middleCols<3>(B::kRotation) = -hat(vector(foot.slip())) - r * hat(omega) * hat(n);
 
-      for (int k = 0; k < 3; ++k) {  // along anything, not only along the ground
-        const V3 direction = samples.vector(1);
-        const VectorXd expected = (numeric - left_out).transpose() * direction;
-        CHECK((dense(foot.along(direction)) - expected).norm() < kTolerance);
-      }
-      CHECK((dense(foot.rise()) - dense(foot.along(n))).norm() < 1e-14);
+      // Along anything, not only along the ground.
+      const V3 first = samples.vector(1), second = samples.vector(1);
+      const FootRows<double> rows = foot.rows(Packet<double>(first), Packet<double>(second));
+      const MatrixXd kept = numeric - left_out;
+      CHECK((dense(rows, 0) - kept.transpose() * first).norm() < kTolerance);
+      CHECK((dense(rows, 1) - kept.transpose() * second).norm() < kTolerance);
+      CHECK((dense(rows, 2) - kept.transpose() * n).norm() < kTolerance);
+      VectorXd across(B::Dim);  // its columns are fewer
+      rows.cross(2, B::Covariance::Identity(), across.data());
+      CHECK((across - dense(rows, 2)).norm() < 1e-14);
     }
   }
 }
@@ -119,14 +137,17 @@ TEST_CASE("feet: rows of the height are its derivative") {
     Samples samples(seed);
     const B belief = samples.belief(robot);
     const Eigen::Vector2d slope = belief.ground.tail<2>();
+    const Ground<double> ground(belief);
     for (int endcap = 0; endcap < 6; ++endcap) {
-      const auto height = [&](const B& b) {
-        return VectorXd::Constant(1, tensegrity::tight::height(b, endcap, robot.endcap_radius));
+      const auto height_of = [&](const B& b) {
+        return VectorXd(VectorXd::Constant(1, height(b, endcap, robot)));
       };
-      VectorXd expected = derivative(belief, height).transpose();
+      VectorXd expected = derivative(belief, height_of).transpose();
       expected.segment<2>(B::kGround + 1) +=
           robot.endcap_radius * slope / std::sqrt(1 + slope.squaredNorm());
-      CHECK((dense(tensegrity::tight::height_row(belief, endcap)) - expected).norm() < kTolerance);
+      const Foot<double> foot(belief, ground, endcap, robot.endcap_radius, robot.rod_length);
+      const Packet<double> any = ground.any_direction();
+      CHECK((dense(foot.rows(any, any), 3) - expected).norm() < kTolerance);
     }
   }
 }
@@ -141,6 +162,15 @@ TEST_CASE("feet: a sphere that touches a sloped plane has height zero") {
     V3 touching = foot;
     touching.z() = belief.ground.dot(V3(1, foot.x(), foot.y()));
     belief.columns.col(endcap) = touching + robot.endcap_radius * n;
-    CHECK(std::abs(tensegrity::tight::height(belief, endcap, robot.endcap_radius)) < 1e-12);
+    CHECK(std::abs(height(belief, endcap, robot)) < 1e-12);
   }
+}
+
+TEST_CASE("feet: any direction along the ground is a unit vector across the normal") {
+  const Prism<double> robot;
+  Samples samples(2);
+  const Ground<double> ground(samples.belief(robot));
+  const V3 along = vector(ground.any_direction());
+  CHECK(along.norm() == doctest::Approx(1));
+  CHECK(std::abs(along.dot(vector(ground.normal))) < 1e-15);
 }

@@ -15,6 +15,7 @@ using tensegrity::Prism;
 using tensegrity::tight::correct_foot;
 using tensegrity::tight::Foot;
 using tensegrity::tight::FootNoise;
+using tensegrity::tight::Ground;
 using tensegrity::tight::SequentialUpdate;
 using V2 = Eigen::Vector2d;
 
@@ -44,8 +45,13 @@ class Sliding {
 
   V2 velocity() const { return plane.transpose() * belief.velocity(); }
   V2 slip(int endcap) const {
-    const Foot<double> foot(belief, endcap, kRobot.endcap_radius, kRobot.rod_length, normal);
-    return plane.transpose() * foot.slip();
+    const Ground<double> ground(belief);
+    const Foot<double> foot(belief, ground, endcap, kRobot.endcap_radius, kRobot.rod_length);
+    return plane.transpose() * vector(foot.slip());
+  }
+  double height(int endcap) const {
+    const Ground<double> ground(belief);
+    return Foot<double>(belief, ground, endcap, kRobot.endcap_radius, kRobot.rod_length).height();
   }
   // Velocity at which a foot would stand.
   V2 standing(int endcap) const { return velocity() - slip(endcap); }
@@ -120,9 +126,10 @@ void check_converges(double slope) {
     for (int k = 0; k < 400; ++k) {
       robot.belief.covariance +=
           unrest * unrest * robot.together.lazyProduct(robot.together.transpose());
+      const Ground<double> ground(robot.belief);
       SequentialUpdate<double> update(robot.belief);
       for (std::size_t i = 0; i < 3; ++i) {
-        correct_foot(update, robot.belief, kFeet[i], share[i], kRobot, kNoise, kDt);
+        correct_foot(update, robot.belief, ground, kFeet[i], share[i], kRobot, kNoise, kDt);
       }
     }
     const double std = std::sqrt(robot.variance(V2::UnitX()) + robot.variance(V2::UnitY()));
@@ -154,7 +161,7 @@ TEST_CASE("one foot on level ground pulls with its friction and informs across i
     const double r = (kNoise.creep * kNoise.creep + kNoise.slip_length * speed / share) / kDt;
     {
       SequentialUpdate<double> update(robot.belief);
-      const auto result = correct_foot(update, robot.belief, 3, share, kRobot, kNoise, kDt);
+      const auto result = correct_foot(update, robot.belief, Ground<double>(robot.belief), 3, share, kRobot, kNoise, kDt);
       CHECK(result.speed == doctest::Approx(speed));
     }
     CHECK((robot.velocity() - (start - p / (p + r) * slip)).norm() < 1e-12);
@@ -173,7 +180,7 @@ TEST_CASE("a foot that stands still informs in every direction, as far as it cre
   robot.belief.rate.setZero();
   {
     SequentialUpdate<double> update(robot.belief);
-    correct_foot(update, robot.belief, 5, 0.4, kRobot, kNoise, kDt);
+    correct_foot(update, robot.belief, Ground<double>(robot.belief), 5, 0.4, kRobot, kNoise, kDt);
   }
   const double p = 0.01, r = kNoise.creep * kNoise.creep / kDt;
   for (const V2& direction : {V2(1, 0), V2(0, 1), V2(0.6, 0.8)}) {
@@ -192,18 +199,17 @@ TEST_CASE("height: a foot that carries a third or more is held on the plane, les
         robot.belief.covariance(B::endcap_index(i) + 2, B::endcap_index(j) + 2) = p;
       }
     }
-    const double above = tensegrity::tight::height(robot.belief, 5, kRobot.endcap_radius);
+    const double above = robot.height(5);
     double chi_square;
     {
       SequentialUpdate<double> update(robot.belief);
-      const auto result = correct_foot(update, robot.belief, 5, share, kRobot, kNoise, kDt);
+      const auto result = correct_foot(update, robot.belief, Ground<double>(robot.belief), 5, share, kRobot, kNoise, kDt);
       CHECK(result.height == above);
       chi_square = result.height_chi_square;
     }
     const double touching = std::min(std::max(3 * share, 0.005), 1.0);
     const double r = kNoise.height * kNoise.height / (kDt * touching * touching);
     CHECK(chi_square == doctest::Approx(above * above / (p + r)));
-    CHECK(tensegrity::tight::height(robot.belief, 5, kRobot.endcap_radius) ==
-          doctest::Approx(above * r / (p + r)));
+    CHECK(robot.height(5) == doctest::Approx(above * r / (p + r)));
   }
 }

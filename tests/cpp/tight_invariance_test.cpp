@@ -37,9 +37,10 @@ void correct_by_shape(B& belief, const CableLengths<double>& lengths) {
 }
 
 void correct_by_ground(B& belief) {
+  const tensegrity::tight::Ground<double> ground(belief);
   SequentialUpdate<double> update(belief);
   for (const int foot : {0, 3, 5}) {
-    tensegrity::tight::correct_foot(update, belief, foot, 1.0 / 3, kRobot, kFeet, 0.005);
+    tensegrity::tight::correct_foot(update, belief, ground, foot, 1.0 / 3, kRobot, kFeet, 0.005);
   }
 }
 

@@ -41,6 +41,9 @@ class Samples {
   std::unique_ptr<State> state_;
 };
 
+// The three numbers of a packet.
+inline V3 vector(const Packet<double>& x) { return {x.at(0), x.at(1), x.at(2)}; }
+
 // X <- Exp(e) X, theta <- theta + e.
 B perturbed(const B& belief, const VectorXd& e);
 

@@ -41,6 +41,8 @@ template class LooseFilter<SCALAR>;
 template class shape::Solver<SCALAR>;
 template class shape::Tracker<SCALAR>;
 template class tight::Foot<SCALAR>;
+template class tight::FootRows<SCALAR>;
+template struct tight::Ground<SCALAR>;
 template class tight::Row<SCALAR>;
 template class tight::SequentialUpdate<SCALAR>;
 #endif

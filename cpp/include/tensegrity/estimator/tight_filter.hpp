@@ -273,13 +273,14 @@ class TightFilter {
                                          config_.foot_height_std, config_.friction};
     worst_height_ = 0;
     slowest_foot_ = std::numeric_limits<Scalar>::max();
+    const tight::Ground<Scalar> ground(belief_);
     tight::SequentialUpdate<Scalar> update(belief_);
     Scalar chi_square = 0, feet = 0;
     for (int endcap = 0; endcap < 6; ++endcap) {
       const Scalar share = shares[std::size_t(endcap)];
       if (!(share > 0)) continue;
-      const auto foot =
-          tight::correct_foot(update, belief_, endcap, share, robot_, noise, dt, spin(endcap / 2));
+      const auto foot = tight::correct_foot(update, belief_, ground, endcap, share, robot_, noise,
+                                            dt, spin(endcap / 2));
       chi_square += foot.height_chi_square;
       feet += 1;
       if (share > kWatchedShare) worst_height_ = std::max(worst_height_, std::abs(foot.height));

@@ -112,6 +112,11 @@ class Packet {
     for (int k = 0; k < kRegisters; ++k) x.part_[k] += y.part_[k];
     return x;
   }
+  friend Packet operator-(Packet x, const Packet& y) {
+#pragma GCC unroll 4
+    for (int k = 0; k < kRegisters; ++k) x.part_[k] -= y.part_[k];
+    return x;
+  }
 
   // The first three numbers.
   template <typename Derived>
@@ -134,6 +139,12 @@ class Packet {
     const Scalar x = a.at(0), y = a.at(1), z = a.at(2);
     return {y * b.at(2) - z * b.at(1), z * b.at(0) - x * b.at(2), x * b.at(1) - y * b.at(0),
             Scalar(0)};
+  }
+
+  // Of the first three numbers.
+  static Scalar dot(const Packet& a, const Packet& b) {
+    const Packet c = a * b;
+    return c.at(0) + c.at(1) + c.at(2);
   }
 
   // As a blend: built with a zero GCC moves a register in a way that Valgrind 3.19 does not know.

@@ -77,6 +77,15 @@ void mirror(Eigen::MatrixBase<Derived>& matrix, int size) {
   }
 }
 
+// Of `packets` sums so many at once that none waits for its last addition, and all stay in
+// registers: there is a factor besides, and a number from memory.
+template <typename Scalar>
+constexpr int packets_at_once(int packets) {
+  const int most = Packet<Scalar>::kHeld + 1;
+  const int groups = (packets - 1) / most + 1;
+  return (packets + groups - 1) / groups;
+}
+
 // sum a_i x_i of columns x_i of `Rows` rows in memory, up to `Capacity` of them.
 template <typename Scalar, int Rows, int Capacity>
 class Sum {
@@ -90,22 +99,20 @@ class Sum {
   void store(Scalar* out) const { store_from<0>(out); }
 
  private:
-  // So many sums at once that none waits for its last addition, and all stay in registers.
-  static constexpr int kMost = Packet<Scalar>::kHeld;
   static constexpr int kPackets = Rows / 4;
-  static constexpr int kGroup = (kPackets + (kPackets - 1) / kMost) / ((kPackets - 1) / kMost + 1);
+  static constexpr int kGroup = packets_at_once<Scalar>(kPackets);
 
   template <int First>
   void store_from(Scalar* out) const {
     constexpr int kHere = std::min(kGroup, kPackets - First);
     Packet<Scalar> sum[kHere];
     for (int k = 0; k < count_; ++k) {
-#pragma GCC unroll 12
+#pragma GCC unroll 13
       for (int i = 0; i < kHere; ++i) {
         sum[i].add(factors_[k], Packet<Scalar>(columns_[k] + 4 * (First + i)));
       }
     }
-#pragma GCC unroll 12
+#pragma GCC unroll 13
     for (int i = 0; i < kHere; ++i) sum[i].store(out + 4 * (First + i));
     if constexpr (First + kHere < kPackets) store_from<First + kHere>(out);
   }
@@ -114,6 +121,32 @@ class Sum {
   const Scalar* columns_[Capacity];
   int count_ = 0;
 };
+
+// P h for an h of `blocks` blocks of three numbers, for the columns of P from at[b] on. From one
+// number of h to the next it is `Step`.
+template <int Step, int First = 0, typename Derived>
+void multiply_blocks(const Eigen::MatrixBase<Derived>& p, const int* at,
+                     const typename Derived::Scalar* h, int blocks, typename Derived::Scalar* out) {
+  using Scalar = typename Derived::Scalar;
+  constexpr int kStride = Derived::RowsAtCompileTime;
+  constexpr int kPackets = kStride / 4;
+  constexpr int kHere = std::min(packets_at_once<Scalar>(kPackets), kPackets - First);
+  Packet<Scalar> sum[kHere];
+  const Scalar* factor = h;
+  for (int b = 0; b < blocks; ++b) {
+    const Scalar* column = &p.derived().coeffRef(4 * First, at[b]);
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; ++i, factor += Step, column += kStride) {
+#pragma GCC unroll 13
+      for (int k = 0; k < kHere; ++k) sum[k].add(*factor, Packet<Scalar>(column + 4 * k));
+    }
+  }
+#pragma GCC unroll 13
+  for (int k = 0; k < kHere; ++k) sum[k].store(out + 4 * (First + k));
+  if constexpr (First + kHere < kPackets) {
+    multiply_blocks<Step, First + kHere>(p, at, h, blocks, out);
+  }
+}
 
 // Columns of numbers in memory, `Stride` apart.
 template <typename Scalar, int Stride>

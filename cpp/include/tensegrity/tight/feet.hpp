@@ -12,100 +12,138 @@
 
 #include <limits>
 
-#include "tensegrity/tight/sequential_update.hpp"
+#include "tensegrity/tight/foot_rows.hpp"
 
 namespace tensegrity::tight {
+
+// What the feet of one instant have in common. Packets are vectors of three.
+template <typename Scalar>
+struct Ground {
+  using P = Packet<Scalar>;
+
+  explicit Ground(const Belief<Scalar>& belief)
+      : height(belief.ground[0]),
+        up(-belief.ground[1], -belief.ground[2], Scalar(1), Scalar(0)),
+        steepness(std::sqrt(P::dot(up, up))),
+        normal((1 / steepness) * up),
+        base_rate(Vector3<Scalar>(belief.rotation * belief.rate)) {
+    for (int k = 0; k < 3; ++k) {
+      to_body[std::size_t(k)] = P(Vector3<Scalar>(belief.rotation.row(k).transpose()));
+    }
+  }
+
+  // Any direction along it.
+  P any_direction() const {
+    return P(Vector3<Scalar>(
+        Vector3<Scalar>(normal.at(0), normal.at(1), normal.at(2)).unitOrthogonal()));
+  }
+  // R' x
+  P in_body(const P& x) const {
+    P y = x.at(0) * to_body[0];
+    y.add(x.at(1), to_body[1]);
+    y.add(x.at(2), to_body[2]);
+    return y;
+  }
+
+  Scalar height;         // m0
+  P up;                  // (-m1, -m2, 1)
+  Scalar steepness;      // |up|
+  P normal;              // n
+  P base_rate;           // angular velocity of the base rod, world [rad/s]
+  Block<Scalar> to_body;  // R'
+};
 
 template <typename Scalar>
 class Foot {
  public:
   using B = Belief<Scalar>;
-  using V3 = Vector3<Scalar>;
+  using P = Packet<Scalar>;
 
-  // `spin`: rate of a free rod about its own axis, toward its even endcap [rad/s], NaN: not
+  // `ground`: that of the belief; it has to outlive the foot. `spin`: rate of a free rod about its own axis, toward its even endcap [rad/s], NaN: not
   // measured.
-  Foot(const B& belief, int endcap, Scalar radius, Scalar rod_length, const V3& normal,
+  Foot(const B& belief, const Ground<Scalar>& ground, int endcap, Scalar radius, Scalar rod_length,
        Scalar spin = std::numeric_limits<Scalar>::quiet_NaN())
-      : endcap_(endcap), normal_(normal), to_body_(belief.rotation.transpose()) {
-    const V3 base_rate = belief.rotation * belief.rate;
-    slip_ = belief.endcap_velocity(endcap);
+      : ground_(ground),
+        endcap_(endcap),
+        center_(belief.endcap(endcap)),
+        slip_(belief.endcap_velocity(endcap)),
+        height_(P::dot(ground.up, center_) - ground.height - radius * ground.steepness) {
+    const P& n = ground.normal;
     if (base()) {
-      slip_ -= radius * base_rate.cross(normal);
-      arm_ = radius * (to_body_ * normal) - belief.base[std::size_t(endcap)];
+      slip_.subtract(radius, P::cross(ground.base_rate, n));
+      arm_ = radius * ground.in_body(n) - P(belief.base[std::size_t(endcap)]);
       return;
     }
     const int other = endcap ^ 1;
-    axis_ = (belief.endcap(endcap) - belief.endcap(other)).normalized();
-    const V3 turn = (slip_ - belief.endcap_velocity(other)) / rod_length;
-    // (u x turn) x n = turn (u . n) - u (turn . n)
-    about_ = axis_.cross(normal);
+    const P span = center_ - P(belief.endcap(other));
+    const Scalar length = std::sqrt(P::dot(span, span));
+    if (length > 0) axis_ = (1 / length) * span;
+    const P turn = slip_ - P(belief.endcap_velocity(other));  // times the rod's length
+    about_ = P::cross(axis_, n);
     by_gyro_ = std::isnan(spin);
-    const Scalar about_itself = by_gyro_ ? axis_.dot(base_rate) : endcap < other ? spin : -spin;
-    slip_ -= radius * (turn * axis_.dot(normal) - axis_ * turn.dot(normal) + about_itself * about_);
+    const Scalar about_itself = by_gyro_          ? P::dot(axis_, ground.base_rate)
+                                : endcap < other ? spin
+                                                 : -spin;
+    // (u x turn) x n = turn (u . n) - u (turn . n)
     rolling_ = radius / rod_length;
-    arm_ = radius * (to_body_ * axis_);
+    slip_.subtract(rolling_ * P::dot(axis_, n), turn);
+    slip_.add(rolling_ * P::dot(turn, n), axis_);
+    slip_.subtract(radius * about_itself, about_);
+    arm_ = radius * ground.in_body(axis_);
   }
 
   // Velocity of the touching point, world [m/s].
-  const V3& slip() const { return slip_; }
+  const P& slip() const { return slip_; }
+  // Of its centre above the plane less the radius, along (-m1, -m2, 1): zero [m].
+  Scalar height() const { return height_; }
 
-  // Row of slip . d.
-  Row<Scalar> along(const V3& d) const {
-    Row<Scalar> row;
+  // Rows of slip . first, slip . second, slip . n and of the height.
+  FootRows<Scalar> rows(const P& first, const P& second) const {
+    const P& n = ground_.normal;
+    FootRows<Scalar> rows;
     if (base()) {
       // d . (R hat(b) - r hat(n) R) = ((r R' n - b) x R' d)'
-      row.add(B::kVelocity, d);
-      row.add(B::kGyroBias, arm_.cross(to_body_ * d));
-      return row;
+      const auto by_gyro = [&](const P& d) { return P::cross(arm_, ground_.in_body(d)); };
+      rows.add_slip(B::kVelocity, first, second, n);
+      rows.add_slip(B::kGyroBias, by_gyro(first), by_gyro(second), by_gyro(n));
+      rows.limit_across(2);
+    } else {
+      // Of its own velocity the rod's turn takes r/L ((u . n) d - (u . d) n), of the other's as
+      // much with the other sign.
+      const P by_normal = rolling_ * n;
+      const Scalar by_direction = rolling_ * P::dot(axis_, n);
+      const auto by_other = [&](const P& d) {
+        P h = by_direction * d;
+        h.subtract(P::dot(axis_, d), by_normal);
+        return h;
+      };
+      const P other_first = by_other(first), other_second = by_other(second);
+      rows.add_slip(B::endcap_velocity_index(endcap_), first - other_first, second - other_second,
+                    n);
+      rows.add_slip(B::endcap_velocity_index(endcap_ ^ 1), other_first, other_second);
+      if (by_gyro_) {
+        rows.add_slip(B::kGyroBias, P::dot(about_, first) * arm_, P::dot(about_, second) * arm_);
+      }
     }
-    // Of its own velocity the rod's turn takes r/L ((u . n) d - (u . d) n), of the other's as much
-    // with the other sign.
-    const V3 other = rolling_ * (axis_.dot(normal_) * d - axis_.dot(d) * normal_);
-    row.add(B::endcap_velocity_index(endcap_), d - other);
-    row.add(B::endcap_velocity_index(endcap_ ^ 1), other);
-    if (by_gyro_) row.add(B::kGyroBias, about_.dot(d) * arm_);
-    return row;
-  }
-  // Row of slip . n: across the plane the touching point of a free rod moves as its endcap does.
-  Row<Scalar> rise() const {
-    if (base()) return along(normal_);
-    Row<Scalar> row;
-    row.add(B::endcap_velocity_index(endcap_), normal_);
-    return row;
+    rows.set_height(0, B::endcap_index(endcap_), ground_.up);
+    rows.set_height(1, B::kRotation, P::cross(center_, ground_.up));
+    rows.set_height(2, B::kGround, {Scalar(-1), -center_.at(0), -center_.at(1), Scalar(0)});
+    return rows;
   }
 
  private:
   bool base() const { return endcap_ < 2; }
 
+  const Ground<Scalar>& ground_;
   int endcap_;
-  V3 normal_;
-  Matrix3<Scalar> to_body_;  // R'
-  V3 slip_;
-  V3 arm_;  // of the base rod r R' n - b, of a free one r R' u
+  P center_, slip_;
+  Scalar height_;
+  P arm_;  // of the base rod r R' n - b, of a free one r R' u
   // Of a free rod: its direction u toward this endcap, u x n, r/L, and whether the base rod's gyro
   // stands for its spin.
-  V3 axis_, about_;
-  Scalar rolling_;
-  bool by_gyro_;
+  P axis_, about_;
+  Scalar rolling_ = 0;
+  bool by_gyro_ = false;
 };
-
-// Height of a touching endcap above the ground plane, along (-m1, -m2, 1): zero [m].
-template <typename Scalar>
-Scalar height(const Belief<Scalar>& belief, int endcap, Scalar radius) {
-  const Vector3<Scalar> up(-belief.ground[1], -belief.ground[2], 1);
-  return up.dot(belief.endcap(endcap)) - belief.ground[0] - radius * up.norm();
-}
-
-template <typename Scalar>
-Row<Scalar> height_row(const Belief<Scalar>& belief, int endcap) {
-  using B = Belief<Scalar>;
-  const Vector3<Scalar> up(-belief.ground[1], -belief.ground[2], 1);
-  const Vector3<Scalar> q = belief.endcap(endcap);
-  Row<Scalar> row;
-  row.add(B::endcap_index(endcap), up);
-  row.add(B::kRotation, q.cross(up));
-  row.add(B::kGround, Vector3<Scalar>(-1, -q.x(), -q.y()));
-  return row;
-}
 
 }  // namespace tensegrity::tight

@@ -28,6 +28,7 @@
 #pragma once
 
 #include "tensegrity/tight/feet.hpp"
+#include "tensegrity/tight/sequential_update.hpp"
 
 namespace tensegrity::tight {
 
@@ -59,33 +60,34 @@ struct FootResult {
 // the foot that is about to lift off carries little, and holding it down would bend the shape.
 template <typename Scalar>
 FootResult<Scalar> correct_foot(SequentialUpdate<Scalar>& update, const Belief<Scalar>& belief,
-                                int endcap, Scalar share, const Prism<Scalar>& robot,
-                                const FootNoise<Scalar>& noise, Scalar dt,
+                                const Ground<Scalar>& ground, int endcap, Scalar share,
+                                const Prism<Scalar>& robot, const FootNoise<Scalar>& noise,
+                                Scalar dt,
                                 Scalar spin = std::numeric_limits<Scalar>::quiet_NaN()) {
-  using V3 = Vector3<Scalar>;
-  const V3 normal = belief.ground_normal();
-  const Foot<Scalar> foot(belief, endcap, robot.endcap_radius, robot.rod_length, normal, spin);
-  const Scalar rise = normal.dot(foot.slip());
-  const V3 slip = foot.slip() - rise * normal;
-  const Scalar speed = slip.norm();
-  const V3 along = speed > Scalar(1e-6) ? V3(slip / speed) : normal.unitOrthogonal();
+  using P = Packet<Scalar>;
+  const P& normal = ground.normal;
+  const Foot<Scalar> foot(belief, ground, endcap, robot.endcap_radius, robot.rod_length, spin);
+  const Scalar rise = P::dot(normal, foot.slip());
+  P slip = foot.slip();
+  slip.subtract(rise, normal);
+  const Scalar speed = std::sqrt(P::dot(slip, slip));
+  const P along = speed > Scalar(1e-6) ? (1 / speed) * slip : ground.any_direction();
+  const P across = P::cross(normal, along);
 
   const Scalar variance = (noise.creep * noise.creep +
                            noise.slip_length * speed / std::max(share, Scalar(kLeastShare))) /
                           dt;
-  const V3 across = normal.cross(along);
-  const V3 downhill = (normal * normal.z() - V3::UnitZ()) / (noise.friction * normal.z());
-  update.correct(foot.along(across), -speed * downhill.dot(across), variance);
-  update.correct(foot.along(along), speed * (1 - downhill.dot(along)), variance, Scalar(0),
-                 noise.slip_speed / (noise.slip_speed + speed));
-
+  // t = (n n.z - e_z) / (mu n.z), of which n has no part in the directions along the ground.
+  const Scalar downhill = -1 / (noise.friction * normal.at(2));
   const Scalar belief_in_contact = std::min(std::max(3 * share, Scalar(0.005)), Scalar(1));
-  const Scalar trust = dt * belief_in_contact * belief_in_contact;
-  update.correct(foot.rise(), rise, noise.rise * noise.rise / trust);
-  const Scalar above = height(belief, endcap, robot.endcap_radius);
-  const Scalar chi_square =
-      update.correct(height_row(belief, endcap), above, noise.height * noise.height / trust);
-  return {speed, above, chi_square};
+  const Scalar distrust = 1 / (dt * belief_in_contact * belief_in_contact);
+  const P chi_squares = update.correct(
+      foot.rows(across, along),
+      {-speed * downhill * across.at(2), speed * (1 - downhill * along.at(2)), rise, foot.height()},
+      {variance, variance, noise.rise * noise.rise * distrust,
+       noise.height * noise.height * distrust},
+      {Scalar(1), noise.slip_speed / (noise.slip_speed + speed), Scalar(1), Scalar(1)});
+  return {speed, foot.height(), chi_squares.at(3)};
 }
 
 }  // namespace tensegrity::tight

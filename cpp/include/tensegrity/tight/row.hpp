@@ -14,7 +14,6 @@ template <typename Scalar>
 class Row {
  public:
   static constexpr int kMaxBlocks = 6;
-  static constexpr int kMost = 3 * kMaxBlocks + 1;  // elements
 
   void add(int at, const Vector3<Scalar>& h) {
     for (int k = 0; k < blocks_; ++k) {
@@ -31,12 +30,14 @@ class Row {
     single_ = h;
   }
 
-  // Calls `use(index, coefficient)` for every element that is not zero.
-  template <typename Use>
-  void for_each(const Use& use) const {
-    if (single_at_ >= 0) use(single_at_, single_);
-    for (int k = 0; k < blocks_; ++k) {
-      for (int i = 0; i < 3; ++i) use(at_[std::size_t(k)] + i, h_[std::size_t(k)][i]);
+  // P H'
+  void cross(const typename Belief<Scalar>::Covariance& p, Scalar* out) const {
+    multiply_blocks<1>(p, at_.data(), h_[0].data(), blocks_, out);
+    if (single_at_ < 0) return;
+    for (int i = 0; i < Belief<Scalar>::Dim; i += 4) {
+      Packet<Scalar> sum(out + i);
+      sum.add(single_, Packet<Scalar>(&p(i, single_at_)));
+      sum.store(out + i);
     }
   }
   // H x
