@@ -101,9 +101,18 @@ struct Belief {
   // X <- Exp(-xi) X, theta <- theta - zeta: takes an estimated error out of the mean.
   void retract(const ErrorVector& e) {
     const Gamma<Scalar> gamma(-e.template segment<3>(kRotation));
+    const auto packets = [](const M3& m) {
+      return Block<Scalar>{Packet<Scalar>(V3(m.col(0))), Packet<Scalar>(V3(m.col(1))),
+                           Packet<Scalar>(V3(m.col(2)))};
+    };
+    const Block<Scalar> g0 = packets(gamma.g0), g1 = packets(gamma.g1);
     for (int c = 0; c < kColumns; ++c) {
-      columns.col(c) =
-          (gamma.g0 * columns.col(c) - gamma.g1 * e.template segment<3>(column_index(c))).eval();
+      const Scalar* error = &e[column_index(c)];
+      auto column = columns.col(c);
+      Packet<Scalar> moved = column[0] * g0[0], back = error[0] * g1[0];
+      moved.add(column[1], g0[1]), back.add(error[1], g1[1]);
+      moved.add(column[2], g0[2]), back.add(error[2], g1[2]);
+      (moved - back).store_vector(column);
     }
     rotation = orthonormalized<Scalar>(gamma.g0 * rotation);
     gyro_bias -= e.template segment<3>(kGyroBias);

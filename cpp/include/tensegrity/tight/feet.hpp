@@ -34,8 +34,9 @@ struct Ground {
 
   // Any direction along it.
   P any_direction() const {
-    return P(Vector3<Scalar>(
-        Vector3<Scalar>(normal.at(0), normal.at(1), normal.at(2)).unitOrthogonal()));
+    // Across the world's y, which no normal of a plane z(x, y) is along.
+    const P across(normal.at(2), Scalar(0), -normal.at(0), Scalar(0));
+    return (1 / std::sqrt(P::dot(across, across))) * across;
   }
   // R' x
   P in_body(const P& x) const {

@@ -73,7 +73,8 @@ class SequentialUpdate {
     pad();
     if (waiting_ == kCapacity) downdate();
     const int own = waiting_;
-    for (int k = 0; k < 4; ++k) rows.cross(k, belief_.covariance, cross(own + k));
+    // Rows that are known early come first: those of the slip wait for its direction.
+    for (int k = 3; k >= 0; --k) rows.cross(k, belief_.covariance, cross(own + k));
     P seen[kCapacity];  // columns of H P H' in these rows
     for (int k = 0; k < own + 4; k += 4) rows.template times<4>(cross(k), &seen[k], B::Dim);
     if (taken_) {
