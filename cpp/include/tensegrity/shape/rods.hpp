@@ -58,7 +58,7 @@ class Rods {
       const Vector3<Scalar> even = endcaps.col(2 * k + 2);
       const Vector3<Scalar> odd = endcaps.col(2 * k + 3);
       rods_[std::size_t(k)].centre = (even + odd) / 2;
-      const Vector3<Scalar> u = (even - odd).normalized();
+      const Vector3<Scalar> u = even - odd;
       // The axis least aligned with u gives a well-conditioned plane across the rod.
       int axis = 0;
       u.cwiseAbs().minCoeff(&axis);
@@ -95,8 +95,6 @@ class Rods {
         rod.centre[i] += delta[5 * k + i];
         u[i] = rod.frame(i, 2) + a * rod.frame(i, 0) + b * rod.frame(i, 1);
       }
-      const Scalar scale = 1 / std::sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
-      for (int i = 0; i < 3; ++i) u[i] *= scale;
       set_direction(rod, u, rod.frame.col(0));
     }
   }
@@ -141,13 +139,24 @@ class Rods {
   }
 
  private:
-  // `hint` is any vector that is not parallel to u; its part across u becomes the first axis.
-  static void set_direction(Rod& rod, const Vector3<Scalar>& u, const Vector3<Scalar>& hint) {
-    // By components: Eigen's packets of two would wait for what is stored one by one.
-    const Scalar along = u[0] * hint[0] + u[1] * hint[1] + u[2] * hint[2];
-    const Scalar x = hint[0] - along * u[0], y = hint[1] - along * u[1], z = hint[2] - along * u[2];
-    const Scalar scale = 1 / std::sqrt(x * x + y * y + z * z);
-    const Vector3<Scalar> first(scale * x, scale * y, scale * z);
+  // `along` is the rod's direction, of any length, `hint` any vector that is not parallel to it: its
+  // part across becomes the first axis.
+  static void set_direction(Rod& rod, const Vector3<Scalar>& along, const Vector3<Scalar>& hint) {
+    // By components: Eigen's packets of two would wait for what is stored one by one. Both norms
+    // come from dot products of what is given, |x|^2 |h - (h . x) x / |x|^2|^2 = |x|^2 |h|^2 -
+    // (h . x)^2, so that neither root waits for the other.
+    const auto dot = [](const Vector3<Scalar>& a, const Vector3<Scalar>& b) {
+      return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    };
+    const Scalar squared = dot(along, along), common = dot(along, hint);
+    const Scalar by_length = 1 / std::sqrt(squared);
+    const Scalar by_area = 1 / std::sqrt(squared * dot(hint, hint) - common * common);
+    const Scalar scale = by_length * by_area;
+    Vector3<Scalar> u, first;
+    for (int i = 0; i < 3; ++i) {
+      u[i] = by_length * along[i];
+      first[i] = scale * (squared * hint[i] - common * along[i]);
+    }
     rod.frame << first[0], u[1] * first[2] - u[2] * first[1], u[0],  //
         first[1], u[2] * first[0] - u[0] * first[2], u[1],           //
         first[2], u[0] * first[1] - u[1] * first[0], u[2];
