@@ -167,6 +167,19 @@ class Packet {
     }
   }
 
+  // (x_A, x_B, x_C, x_D)
+  template <int A, int B, int C, int D>
+  static Packet permute(const Packet& x) {
+#if __has_builtin(__builtin_shufflevector)
+    if constexpr (kRegisters == 1) {
+      Packet out;
+      out.part_[0] = __builtin_shufflevector(x.part_[0], x.part_[0], A, B, C, D);
+      return out;
+    }
+#endif
+    return {x.at(A), x.at(B), x.at(C), x.at(D)};
+  }
+
   // Columns of a block of four by four become its rows.
   static void transpose(Packet& x0, Packet& x1, Packet& x2, Packet& x3) {
 #if __has_builtin(__builtin_shufflevector)

@@ -68,6 +68,8 @@ class Rods {
 
   const Rod& rod(int k) const { return rods_[std::size_t(k)]; }
   Scalar half_length() const { return half_length_; }
+  // Endcap 0 or 1, in the body frame [m].
+  const Vector3<Scalar>& base(int endcap) const { return base_[std::size_t(endcap)]; }
 
   // Endcap centres in the body frame, one per column [m].
   Endcaps<Scalar> endcaps() const {
