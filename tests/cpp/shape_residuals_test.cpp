@@ -7,7 +7,7 @@
 namespace tensegrity::shape {
 namespace {
 
-TEST_CASE("cost, gradient and Hessian of the residuals") {
+TEST_CASE("cost, gradient and Hessian of the residuals, alone and as equations of a step") {
   const Prism<double> prism;
   test::Samples samples(40);
   for (int n = 0; n < 100; ++n) {
@@ -24,10 +24,11 @@ TEST_CASE("cost, gradient and Hessian of the residuals") {
     TangentMatrix<double> dense = jacobian.transpose() * jacobian + spin * spin.transpose();
     for (const bool second_order : {false, true}) {
       if (second_order) dense += test::weighted_length_hessian(rods, r);
-      TangentMatrix<double> off;
-      residuals.hessian(rods, second_order, columns(off));
-      off -= dense;
+      Matrix<double, padded(kTangent + 1), kTangent> equations;
+      residuals.equations(rods, second_order, columns(equations));
+      const TangentMatrix<double> off = equations.topRows<kTangent>() - dense;
       CHECK(TangentMatrix<double>(off.triangularView<Eigen::Lower>()).norm() < 1e-12);
+      CHECK(equations.row(kTangent).transpose() == residuals.gradient(rods));
     }
   }
 }

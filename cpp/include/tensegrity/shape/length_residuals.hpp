@@ -61,30 +61,31 @@ class LengthResiduals {
 
   // J' residuals
   Tangent<Scalar> gradient(const Rods<Scalar>& rods) const {
-    Tangent<Scalar> out;
-    const Vectors pull = forces(), across = directions_across(rods);
+    Vectors push;
     P turn;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const P push = of_even(pull[i]) + of_odd(pull[i]);
-      out[int(i)] = push.at(0);
-      out[5 + int(i)] = push.at(2);
-      turn = turn + across[i] * (of_even(pull[i]) - of_odd(pull[i]));
+    pull(directions_across(rods), push, turn);
+    Tangent<Scalar> out;
+    for (int i = 0; i < 3; ++i) {
+      out[i] = push[std::size_t(i)].at(0);
+      out[5 + i] = push[std::size_t(i)].at(2);
     }
     out[3] = turn.at(0), out[4] = turn.at(1);
     out[8] = turn.at(2), out[9] = turn.at(3);
     return out;
   }
 
-  // J' J, and with `second_order` the second derivatives of the lengths times the residuals as
-  // well, to the lower triangle of `h`; a unit stiffness holds the spin about z.
+  // The equations of a step: in the lower triangle of `h` J' J, with `second_order` and the second
+  // derivatives of the lengths times the residuals, and a unit stiffness that holds the spin about
+  // z; below it, in row `kTangent`, the gradient. Above the diagonal is anything.
   template <int Stride>
-  void hessian(const Rods<Scalar>& rods, bool second_order, Columns<Scalar, Stride> h) const {
+  void equations(const Rods<Scalar>& rods, bool second_order, Columns<Scalar, Stride> h) const {
+    static_assert(Stride == padded(kTangent + 1), "whole packets");
     // First, and in two halves: all that follows waits for the division.
-    const Tangent<Scalar> spin = spin_by_angle(rods);
+    const Tangent<Scalar> by_angle = spin_by_angle(rods);
     const auto squares = [&](int rod) {
       const int at = 5 * rod;
-      return (spin[at] * spin[at] + spin[at + 1] * spin[at + 1]) +
-             (spin[at + 3] * spin[at + 3] + spin[at + 4] * spin[at + 4]);
+      return (by_angle[at] * by_angle[at] + by_angle[at + 1] * by_angle[at + 1]) +
+             (by_angle[at + 3] * by_angle[at + 3] + by_angle[at + 4] * by_angle[at + 4]);
     };
     const Scalar squared = squares(0) + squares(1);
     const Scalar unit = squared > 0 ? 1 / squared : Scalar(0);
@@ -100,74 +101,74 @@ class LengthResiduals {
     const Vectors across = directions_across(rods);
     // Of a rod's endcaps together, and of the even one less the odd one.
     Symmetric both, difference;
-    // Between the rods, of `across` of rod 0 on the centre of rod 1 and of rod 1 on that of rod 0,
-    // of directions on directions, and of centres on centres.
-    Symmetric mixed, turning;
-    std::array<Scalar, 6> centres;
+    // Between the rods: of directions across rod 0 on the centre of rod 1 and of those across rod 1
+    // on the centre of rod 0, of directions on directions, and of centres on centres.
+    Symmetric mixed, turning, centres;
     for (std::size_t i = 0; i < 6; ++i) {
       const P own = lane(stiffness[i], 0) + lane(stiffness[i], 1) + lane(stiffness[i], 2);
       both[i] = of_even(own) + of_odd(own);
       difference[i] = of_even(own) - of_odd(own);
       // From rod 0's even end to the even end of rod 1, odd to odd, even to odd.
       const Scalar ee = stiffness[i][4], oo = stiffness[i][5], eo = stiffness[i][8];
-      const Scalar less = oo - ee;
+      const Scalar less = oo - ee, more = oo + ee;
       mixed[i] = {less - eo, less - eo, less + eo, less + eo};
-      centres[i] = -(ee + oo) - eo;
-      const Scalar turn = eo - (ee + oo);
-      turning[i] = {turn, turn, turn, turn};
+      turning[i] = {eo - more, eo - more, eo - more, eo - more};
+      centres[i] = {-more - eo, -more - eo, -more - eo, -more - eo};
     }
 
+    Vectors push;
+    P turn;
+    pull(across, push, turn);
     const Vectors turned = times(difference, across), held = times(both, across),
                   crossed = times(mixed, across), twisted = times(turning, across);
     P along, aside, between;  // a' B a and b' B b, b' B a, and of rod 1 with those of rod 0
     for (std::size_t i = 0; i < 3; ++i) {
       along = along + across[i] * held[i];
-      aside = aside + P::template permute<1, 0, 3, 2>(across[i]) * held[i];
-      between = between + P::template permute<2, 2, 3, 3>(across[i]) *
-                              P::template permute<0, 1, 0, 1>(twisted[i]);
+      aside = aside + swapped(across[i]) * held[i];
+      between = between + P::template permute<2, 3, 2, 3>(across[i]) *
+                              P::template permute<0, 0, 1, 1>(twisted[i]);
     }
     if (second_order) {  // endcaps move on circles about their rod's centre
-      const Vectors pull = forces();
+      const Vectors forces = this->forces();
       P circle;
       for (std::size_t i = 0; i < 3; ++i) {
         const Scalar u0 = rods.rod(0).frame(int(i), 2), u1 = rods.rod(1).frame(int(i), 2);
-        circle = circle + P(u0, u0, u1, u1) * (of_even(pull[i]) - of_odd(pull[i]));
+        circle = circle + P(u0, u0, u1, u1) * (of_even(forces[i]) - of_odd(forces[i]));
       }
       along.subtract(1 / rods.half_length(), circle);
     }
 
-    const auto set = [&](int row, int column, Scalar value) {
-      h[column][row] = value + unit * spin[row] * spin[column];
+    // Columns of the equations, whole packets at a time.
+    const P spin[3] = {P(&by_angle[0]), P(&by_angle[4]),
+                       P(by_angle[8], by_angle[9], Scalar(0), Scalar(0))};
+    const auto put = [&](int column, int packet, P values) {
+      values.add(unit * by_angle[column], spin[packet]);
+      values.store(h[column] + 4 * packet);
     };
-    const auto set_block = [&](int row, int column, const auto& m) {
-      set(row, column, m(0)), set(row + 1, column, m(1)), set(row + 2, column, m(2));
-      set(row, column + 1, m(1)), set(row + 1, column + 1, m(3)), set(row + 2, column + 1, m(4));
-      set(row, column + 2, m(2)), set(row + 1, column + 2, m(4)), set(row + 2, column + 2, m(5));
-    };
-#pragma GCC unroll 2
-    for (int rod = 0; rod < 2; ++rod) {
-      const int at = 5 * rod, a = 2 * rod, b = a + 1;
-      set_block(at, at, [&](std::size_t i) { return both[i].at(a); });
-      for (int i = 0; i < 3; ++i) {
-        set(at + 3, at + i, turned[std::size_t(i)].at(a));
-        set(at + 4, at + i, turned[std::size_t(i)].at(b));
-      }
-      set(at + 3, at + 3, along.at(a));
-      set(at + 4, at + 3, aside.at(a));
-      set(at + 4, at + 4, along.at(b));
+    constexpr std::size_t kRows[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+#pragma GCC unroll 3
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto& row = kRows[i];
+      const int column = int(i);
+      P a = turned[i], b = both[row[0]], c = both[row[1]], d = both[row[2]];
+      P::transpose(a, b, c, d);  // by rod and direction, of which the blocks have two alike
+      put(column, 0, P::template permute<1, 2, 3, 0>(a));
+      put(column + 5, 1, c);
+      put(column, 1,
+          {turned[i].at(1), centres[row[0]].at(0), centres[row[1]].at(0), centres[row[2]].at(0)});
+      put(column, 2, {crossed[i].at(2), crossed[i].at(3), push[i].at(0), Scalar(0)});
+      put(column + 5, 2, {turned[i].at(2), turned[i].at(3), push[i].at(2), Scalar(0)});
     }
-    set_block(5, 0, [&](std::size_t i) { return centres[i]; });
-    for (int i = 0; i < 3; ++i) {
-      const P& on_centres = crossed[std::size_t(i)];
-      set(5 + i, 3, on_centres.at(0));
-      set(5 + i, 4, on_centres.at(1));
-      set(8, i, on_centres.at(2));
-      set(9, i, on_centres.at(3));
-    }
-    set(8, 3, between.at(0));
-    set(8, 4, between.at(1));
-    set(9, 3, between.at(2));
-    set(9, 4, between.at(3));
+    P a(aside.at(0), along.at(1), Scalar(0), Scalar(0)), b = crossed[0], c = crossed[1],
+        d = crossed[2];
+    P::transpose(a, b, c, d);
+    put(3, 0, {Scalar(0), Scalar(0), Scalar(0), along.at(0)});
+    put(3, 1, a);
+    put(3, 2, {between.at(0), between.at(1), turn.at(0), Scalar(0)});
+    put(4, 1, b);
+    put(4, 2, {between.at(2), between.at(3), turn.at(1), Scalar(0)});
+    put(8, 2, {along.at(2), aside.at(2), turn.at(2), Scalar(0)});
+    put(9, 2, {Scalar(0), along.at(3), turn.at(3), Scalar(0)});
   }
 
  private:
@@ -185,6 +186,7 @@ class LengthResiduals {
   static P lane(const Lanes& x, int k) { return P(&x[4 * k]); }
   // Of endcaps 2 .. 5, those of each rod's even or odd one: rod 0 twice, rod 1 twice.
   static P of_even(const P& x) { return P::template permute<0, 0, 2, 2>(x); }
+  static P swapped(const P& x) { return P::template permute<1, 0, 3, 2>(x); }
   static P of_odd(const P& x) { return P::template permute<1, 1, 3, 3>(x); }
 
   // Of cables that are too long, on endcaps 2 .. 5, away from the other end.
@@ -196,6 +198,15 @@ class LengthResiduals {
       }
     }
     return out;
+  }
+  // Of the cables on the centres of the rods, and on their directions across.
+  void pull(const Vectors& across, Vectors& push, P& turn) const {
+    const Vectors at = forces();
+    turn = P();
+    for (std::size_t i = 0; i < 3; ++i) {
+      push[i] = of_even(at[i]) + of_odd(at[i]);
+      turn = turn + across[i] * (of_even(at[i]) - of_odd(at[i]));
+    }
   }
   // Both directions across rod 0, then both across rod 1.
   static Vectors directions_across(const Rods<Scalar>& rods) {

@@ -201,9 +201,8 @@ class Solver {
       ++now.iterations;
       Ldlt<Scalar, kTangent> system;
       const auto model = [&](bool second_order) {
-        residuals.hessian(now.rods, second_order, system.columns());
+        residuals.equations(now.rods, second_order, system.columns());
         for (int k = 0; damping > 0 && k < kTangent; ++k) system.column(k)[k] += damping;
-        system.set_right(residuals.gradient(now.rods));
         return system.factor();
       };
       if (!model(now.newton)) {  // not a minimum of the second-order model
