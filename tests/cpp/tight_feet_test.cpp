@@ -66,8 +66,10 @@ TEST_CASE("feet: the slip is that of the touching point of a rolling sphere") {
     const Ground<double> ground(belief);
     for (int endcap = 0; endcap < 6; ++endcap) {
       for (const double spin : {kUnmeasured, 0.0, 1.7}) {
-        const Foot<double> foot(belief, ground, endcap, robot.endcap_radius, robot.rod_length, spin);
-        CHECK((vector(foot.slip()) - touching_velocity(belief, endcap, robot, n, spin)).norm() < 1e-12);
+        const Foot<double> foot(belief, ground, endcap, robot.endcap_radius, robot.rod_length,
+                                spin);
+        CHECK((vector(foot.slip()) - touching_velocity(belief, endcap, robot, n, spin)).norm() <
+              1e-12);
       }
     }
   }

@@ -161,7 +161,8 @@ TEST_CASE("one foot on level ground pulls with its friction and informs across i
     const double r = (kNoise.creep * kNoise.creep + kNoise.slip_length * speed / share) / kDt;
     {
       SequentialUpdate<double> update(robot.belief);
-      const auto result = correct_foot(update, robot.belief, Ground<double>(robot.belief), 3, share, kRobot, kNoise, kDt);
+      const auto result = correct_foot(update, robot.belief, Ground<double>(robot.belief), 3, share,
+                                       kRobot, kNoise, kDt);
       CHECK(result.speed == doctest::Approx(speed));
     }
     CHECK((robot.velocity() - (start - p / (p + r) * slip)).norm() < 1e-12);
@@ -203,7 +204,8 @@ TEST_CASE("height: a foot that carries a third or more is held on the plane, les
     double chi_square;
     {
       SequentialUpdate<double> update(robot.belief);
-      const auto result = correct_foot(update, robot.belief, Ground<double>(robot.belief), 5, share, kRobot, kNoise, kDt);
+      const auto result = correct_foot(update, robot.belief, Ground<double>(robot.belief), 5, share,
+                                       kRobot, kNoise, kDt);
       CHECK(result.height == above);
       chi_square = result.height_chi_square;
     }

@@ -139,8 +139,8 @@ TEST_CASE("the rows of feet are rows like others, before, after and between them
       for (int step = 0; step < steps; ++step) {
         if (samples.uniform(0, 1) < 0.6) {
           const FootMeasurement m = any_foot(samples);
-          const Packet<double> parts = update.correct(m.rows, packet(m.residual),
-                                                      packet(m.variance), {1.0, 1.0, 1.0, 1.0});
+          const Packet<double> parts =
+              update.correct(m.rows, packet(m.residual), packet(m.variance), {1.0, 1.0, 1.0, 1.0});
           for (int k = 0; k < 4; ++k) chi_square += parts.at(k);
           stack(m.dense, m.residual, m.variance);
         } else {
@@ -175,8 +175,8 @@ TEST_CASE("of a foot each row informs by its own part") {
   const Eigen::Vector4d parts(0.3, 1, 0, 0.8);
   B before = prior;
   for (int k = 0; k < 4; ++k) {  // one after the other, each given those before it
-    const B after = dense_update(before, m.dense.row(k), m.residual.segment<1>(k),
-                                 m.variance.segment<1>(k));
+    const B after =
+        dense_update(before, m.dense.row(k), m.residual.segment<1>(k), m.variance.segment<1>(k));
     expected += parts[k] * (after.covariance - before.covariance);
     before.covariance = after.covariance;
   }

@@ -3,8 +3,8 @@
 //
 // Written for the net instead of through the 9 x 10 Jacobian: a cable is a 3 x 3 stiffness between
 // two endcaps, the endcaps of a free rod move by dc +- across (L/2 du). Each of the four free
-// endcaps holds three cables: what is wanted of all of them is computed for four endcaps, or for two
-// directions across two rods, at once. The three cables between free endcaps are there twice.
+// endcaps holds three cables: what is wanted of all of them is computed for four endcaps, or for
+// two directions across two rods, at once. The three cables between free endcaps are there twice.
 #pragma once
 
 #include <array>
@@ -63,7 +63,7 @@ class LengthResiduals {
   Tangent<Scalar> gradient(const Rods<Scalar>& rods) const {
     Vectors push;
     P turn;
-    pull(directions_across(rods), push, turn);
+    pull(forces(), directions_across(rods), push, turn);
     Tangent<Scalar> out;
     for (int i = 0; i < 3; ++i) {
       out[i] = push[std::size_t(i)].at(0);
@@ -103,7 +103,8 @@ class LengthResiduals {
     Symmetric both, difference;
     // Between the rods: of directions across rod 0 on the centre of rod 1 and of those across rod 1
     // on the centre of rod 0, of directions on directions, and of centres on centres.
-    Symmetric mixed, turning, centres;
+    Symmetric mixed, turning;
+    std::array<Scalar, 6> centres;
     for (std::size_t i = 0; i < 6; ++i) {
       const P own = lane(stiffness[i], 0) + lane(stiffness[i], 1) + lane(stiffness[i], 2);
       both[i] = of_even(own) + of_odd(own);
@@ -113,12 +114,13 @@ class LengthResiduals {
       const Scalar less = oo - ee, more = oo + ee;
       mixed[i] = {less - eo, less - eo, less + eo, less + eo};
       turning[i] = {eo - more, eo - more, eo - more, eo - more};
-      centres[i] = {-more - eo, -more - eo, -more - eo, -more - eo};
+      centres[i] = -more - eo;
     }
 
+    const Vectors force = forces();
     Vectors push;
     P turn;
-    pull(across, push, turn);
+    pull(force, across, push, turn);
     const Vectors turned = times(difference, across), held = times(both, across),
                   crossed = times(mixed, across), twisted = times(turning, across);
     P along, aside, between;  // a' B a and b' B b, b' B a, and of rod 1 with those of rod 0
@@ -129,11 +131,10 @@ class LengthResiduals {
                               P::template permute<0, 0, 1, 1>(twisted[i]);
     }
     if (second_order) {  // endcaps move on circles about their rod's centre
-      const Vectors forces = this->forces();
       P circle;
       for (std::size_t i = 0; i < 3; ++i) {
         const Scalar u0 = rods.rod(0).frame(int(i), 2), u1 = rods.rod(1).frame(int(i), 2);
-        circle = circle + P(u0, u0, u1, u1) * (of_even(forces[i]) - of_odd(forces[i]));
+        circle = circle + P(u0, u0, u1, u1) * (of_even(force[i]) - of_odd(force[i]));
       }
       along.subtract(1 / rods.half_length(), circle);
     }
@@ -145,22 +146,21 @@ class LengthResiduals {
       values.add(unit * by_angle[column], spin[packet]);
       values.store(h[column] + 4 * packet);
     };
-    constexpr std::size_t kRows[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+    constexpr std::size_t kColumns[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};  // of a Symmetric
 #pragma GCC unroll 3
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto& row = kRows[i];
+      const auto& row = kColumns[i];
       const int column = int(i);
       P a = turned[i], b = both[row[0]], c = both[row[1]], d = both[row[2]];
       P::transpose(a, b, c, d);  // by rod and direction, of which the blocks have two alike
       put(column, 0, P::template permute<1, 2, 3, 0>(a));
       put(column + 5, 1, c);
-      put(column, 1,
-          {turned[i].at(1), centres[row[0]].at(0), centres[row[1]].at(0), centres[row[2]].at(0)});
+      put(column, 1, {turned[i].at(1), centres[row[0]], centres[row[1]], centres[row[2]]});
       put(column, 2, {crossed[i].at(2), crossed[i].at(3), push[i].at(0), Scalar(0)});
       put(column + 5, 2, {turned[i].at(2), turned[i].at(3), push[i].at(2), Scalar(0)});
     }
-    P a(aside.at(0), along.at(1), Scalar(0), Scalar(0)), b = crossed[0], c = crossed[1],
-        d = crossed[2];
+    P a(aside.at(0), along.at(1), Scalar(0), Scalar(0));
+    P b = crossed[0], c = crossed[1], d = crossed[2];
     P::transpose(a, b, c, d);
     put(3, 0, {Scalar(0), Scalar(0), Scalar(0), along.at(0)});
     put(3, 1, a);
@@ -186,10 +186,11 @@ class LengthResiduals {
   static P lane(const Lanes& x, int k) { return P(&x[4 * k]); }
   // Of endcaps 2 .. 5, those of each rod's even or odd one: rod 0 twice, rod 1 twice.
   static P of_even(const P& x) { return P::template permute<0, 0, 2, 2>(x); }
-  static P swapped(const P& x) { return P::template permute<1, 0, 3, 2>(x); }
   static P of_odd(const P& x) { return P::template permute<1, 1, 3, 3>(x); }
+  // The other direction across the same rod.
+  static P swapped(const P& x) { return P::template permute<1, 0, 3, 2>(x); }
 
-  // Of cables that are too long, on endcaps 2 .. 5, away from the other end.
+  // The gradient by the positions of endcaps 2 .. 5.
   Vectors forces() const {
     Vectors out;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -199,13 +200,12 @@ class LengthResiduals {
     }
     return out;
   }
-  // Of the cables on the centres of the rods, and on their directions across.
-  void pull(const Vectors& across, Vectors& push, P& turn) const {
-    const Vectors at = forces();
+  // On the centres of the rods, and on their directions across.
+  static void pull(const Vectors& force, const Vectors& across, Vectors& push, P& turn) {
     turn = P();
     for (std::size_t i = 0; i < 3; ++i) {
-      push[i] = of_even(at[i]) + of_odd(at[i]);
-      turn = turn + across[i] * (of_even(at[i]) - of_odd(at[i]));
+      push[i] = of_even(force[i]) + of_odd(force[i]);
+      turn = turn + across[i] * (of_even(force[i]) - of_odd(force[i]));
     }
   }
   // Both directions across rod 0, then both across rod 1.

@@ -141,8 +141,8 @@ class Rods {
   }
 
  private:
-  // `along` is the rod's direction, of any length, `hint` any vector that is not parallel to it: its
-  // part across becomes the first axis.
+  // `along` is the rod's direction, of any length, `hint` any vector that is not parallel to it:
+  // its part across becomes the first axis.
   static void set_direction(Rod& rod, const Vector3<Scalar>& along, const Vector3<Scalar>& hint) {
     // By components: Eigen's packets of two would wait for what is stored one by one. Both norms
     // come from dot products of what is given, |x|^2 |h - (h . x) x / |x|^2|^2 = |x|^2 |h|^2 -

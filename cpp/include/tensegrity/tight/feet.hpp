@@ -46,11 +46,11 @@ struct Ground {
     return y;
   }
 
-  Scalar height;         // m0
-  P up;                  // (-m1, -m2, 1)
-  Scalar steepness;      // |up|
-  P normal;              // n
-  P base_rate;           // angular velocity of the base rod, world [rad/s]
+  Scalar height;          // m0
+  P up;                   // (-m1, -m2, 1)
+  Scalar steepness;       // |up|
+  P normal;               // n
+  P base_rate;            // angular velocity of the base rod, world [rad/s]
   Block<Scalar> to_body;  // R'
 };
 
@@ -60,8 +60,8 @@ class Foot {
   using B = Belief<Scalar>;
   using P = Packet<Scalar>;
 
-  // `ground`: that of the belief; it has to outlive the foot. `spin`: rate of a free rod about its own axis, toward its even endcap [rad/s], NaN: not
-  // measured.
+  // `ground`: that of the belief; it has to outlive the foot. `spin`: rate of a free rod about its
+  // own axis, toward its even endcap [rad/s], NaN: not measured.
   Foot(const B& belief, const Ground<Scalar>& ground, int endcap, Scalar radius, Scalar rod_length,
        Scalar spin = std::numeric_limits<Scalar>::quiet_NaN())
       : ground_(ground),
@@ -82,7 +82,7 @@ class Foot {
     const P turn = slip_ - P(belief.endcap_velocity(other));  // times the rod's length
     about_ = P::cross(axis_, n);
     by_gyro_ = std::isnan(spin);
-    const Scalar about_itself = by_gyro_          ? P::dot(axis_, ground.base_rate)
+    const Scalar about_itself = by_gyro_         ? P::dot(axis_, ground.base_rate)
                                 : endcap < other ? spin
                                                  : -spin;
     // (u x turn) x n = turn (u . n) - u (turn . n)

@@ -62,8 +62,7 @@ template <typename Scalar>
 FootResult<Scalar> correct_foot(SequentialUpdate<Scalar>& update, const Belief<Scalar>& belief,
                                 const Ground<Scalar>& ground, int endcap, Scalar share,
                                 const Prism<Scalar>& robot, const FootNoise<Scalar>& noise,
-                                Scalar dt,
-                                Scalar spin = std::numeric_limits<Scalar>::quiet_NaN()) {
+                                Scalar dt, Scalar spin = std::numeric_limits<Scalar>::quiet_NaN()) {
   using P = Packet<Scalar>;
   const P& normal = ground.normal;
   const Foot<Scalar> foot(belief, ground, endcap, robot.endcap_radius, robot.rod_length, spin);

@@ -1,10 +1,10 @@
 // Corrections one scalar at a time.
 //
 // Every measurement of this filter touches a few blocks of the state: a cable two endcaps and its
-// offset, a foot one rod. As scalars they cost one sparse product and one rank-1 downdate of P
-// each, need no decomposition, and a lost cable is a row left out. All rows of one instant are
-// linearised at the same mean: the error they agree on is collected and taken out of the mean once,
-// so that the result is that of the joint update (for independent noises) whatever the order.
+// offset, a foot one rod. A scalar is one sparse row, and a lost cable is a row left out. All rows
+// of one instant are linearised at the same mean: the error they agree on is collected and taken
+// out of the mean once, so that the result is that of the joint update (for independent noises)
+// whatever the order.
 #pragma once
 
 #include <algorithm>
@@ -101,8 +101,8 @@ class SequentialUpdate {
     information_[row] = information;
   }
 
-  // Rows of G from those of S, `seen` by columns, and of their noise. `Own`: rows so far, -1 for any
-  // number.
+  // Rows of G from those of S, `seen` by columns, and of their noise. `Own`: rows so far, -1 for
+  // any number.
   template <int Own>
   P append(P* seen, P residual, const P& variance, const P& information) {
     const int own = Own < 0 ? waiting_ : Own;
@@ -171,8 +171,8 @@ class SequentialUpdate {
       add_product<true>(own, Columns<const Scalar, B::Dim>{all.first}, Const{&g_(j, 0)}, j, 0,
                         B::Dim);
     }
-    const Scalar g10 = g_(j + 1, j), g20 = g_(j + 2, j), g30 = g_(j + 3, j),
-                 g21 = g_(j + 2, j + 1), g31 = g_(j + 3, j + 1), g32 = g_(j + 3, j + 2);
+    const Scalar g10 = g_(j + 1, j), g20 = g_(j + 2, j), g30 = g_(j + 3, j), g21 = g_(j + 2, j + 1),
+                 g31 = g_(j + 3, j + 1), g32 = g_(j + 3, j + 2);
     for (int i = 0; i < B::Dim; i += 4) {
       P a(own[0] + i), b(own[1] + i), c(own[2] + i), d(own[3] + i), error(&error_[i]);
       a = inverse_[j] * a;
