@@ -37,8 +37,8 @@ DATA = ROOT.parent / "shared" / "data"
 RECORDINGS = {"forward": "forward", "right": "right-turn"}
 """Names of recordings, and the manoeuvres that replace them where there are none."""
 RANGES = ("building45", "outdoor", "rolling_indoor")
-# Short repetitions: whoever else runs on the core then slows down all of one or none, and the median
-# is of one kind.
+# Short repetitions: whoever else runs on the core then slows down all of one or none, and the
+# median is of one kind.
 TIMING = (
     "--benchmark_repetitions=21",
     "--benchmark_min_time=0.03",
