@@ -148,7 +148,7 @@ TEST_CASE("feet: rows of the height are its derivative") {
       expected.segment<2>(B::kGround + 1) +=
           robot.endcap_radius * slope / std::sqrt(1 + slope.squaredNorm());
       const Foot<double> foot(belief, ground, endcap, robot.endcap_radius, robot.rod_length);
-      const Packet<double> any = ground.any_direction();
+      const Packet<double> any = ground.across_y;
       CHECK((dense(foot.rows(any, any), 3) - expected).norm() < kTolerance);
     }
   }
@@ -168,11 +168,11 @@ TEST_CASE("feet: a sphere that touches a sloped plane has height zero") {
   }
 }
 
-TEST_CASE("feet: any direction along the ground is a unit vector across the normal") {
+TEST_CASE("feet: across y along the ground is a unit vector across the normal") {
   const Prism<double> robot;
   Samples samples(2);
   const Ground<double> ground(samples.belief(robot));
-  const V3 along = vector(ground.any_direction());
+  const V3 along = vector(ground.across_y);
   CHECK(along.norm() == doctest::Approx(1));
   CHECK(std::abs(along.dot(vector(ground.normal))) < 1e-15);
 }

@@ -23,21 +23,17 @@ struct Ground {
 
   explicit Ground(const Belief<Scalar>& belief)
       : height(belief.ground[0]),
-        up(-belief.ground[1], -belief.ground[2], Scalar(1), Scalar(0)),
+        up(Vector3<Scalar>(-belief.ground[1], -belief.ground[2], 1)),
         steepness(std::sqrt(P::dot(up, up))),
         normal((1 / steepness) * up),
+        across_y(Vector3<Scalar>(1, 0, belief.ground[1])),
         base_rate(Vector3<Scalar>(belief.rotation * belief.rate)) {
+    across_y = (1 / std::sqrt(P::dot(across_y, across_y))) * across_y;
     for (int k = 0; k < 3; ++k) {
       to_body[std::size_t(k)] = P(Vector3<Scalar>(belief.rotation.row(k).transpose()));
     }
   }
 
-  // Any direction along it.
-  P any_direction() const {
-    // Across the world's y, which no normal of a plane z(x, y) is along.
-    const P across(normal.at(2), Scalar(0), -normal.at(0), Scalar(0));
-    return (1 / std::sqrt(P::dot(across, across))) * across;
-  }
   // R' x
   P in_body(const P& x) const {
     P y = x.at(0) * to_body[0];
@@ -50,6 +46,7 @@ struct Ground {
   P up;                   // (-m1, -m2, 1)
   Scalar steepness;       // |up|
   P normal;               // n
+  P across_y;             // unit vector along the ground, across the world's y
   P base_rate;            // angular velocity of the base rod, world [rad/s]
   Block<Scalar> to_body;  // R'
 };
@@ -128,7 +125,7 @@ class Foot {
     }
     rows.set_height(0, B::endcap_index(endcap_), ground_.up);
     rows.set_height(1, B::kRotation, P::cross(center_, ground_.up));
-    rows.set_height(2, B::kGround, {Scalar(-1), -center_.at(0), -center_.at(1), Scalar(0)});
+    rows.set_height(2, B::kGround, {Scalar(-1), -center_.at(0), -center_.at(1), Scalar(1)});
     return rows;
   }
 

@@ -32,7 +32,7 @@ class FootRows {
     across.store(h_[3 * slip_ + 2]);
     ++slip_;
   }
-  // All of them are set.
+  // All of them are set. The fourth number of `h` does not matter.
   void set_height(int block, int at, const P& h) {
     at_[std::size_t(kBlocks + block)] = at;
     for (int i = 0; i < 3; ++i) P(0, 0, 0, h.at(i)).store(h_[3 * (kBlocks + block) + i]);

@@ -70,7 +70,7 @@ FootResult<Scalar> correct_foot(SequentialUpdate<Scalar>& update, const Belief<S
   P slip = foot.slip();
   slip.subtract(rise, normal);
   const Scalar speed = std::sqrt(P::dot(slip, slip));
-  const P along = speed > Scalar(1e-6) ? (1 / speed) * slip : ground.any_direction();
+  const P along = speed > Scalar(1e-6) ? (1 / speed) * slip : ground.across_y;
   const P across = P::cross(normal, along);
 
   const Scalar variance = (noise.creep * noise.creep +
