@@ -101,9 +101,12 @@ struct Belief {
   // X <- Exp(-xi) X, theta <- theta - zeta: takes an estimated error out of the mean.
   void retract(const ErrorVector& e) {
     const Gamma<Scalar> gamma(-e.template segment<3>(kRotation));
-    const auto packets = [](const M3& m) {
-      return Block<Scalar>{Packet<Scalar>(V3(m.col(0))), Packet<Scalar>(V3(m.col(1))),
-                           Packet<Scalar>(V3(m.col(2)))};
+    // The fourth number of a column does not matter.
+    const auto column_of = [](const M3& m, int k) {
+      return Packet<Scalar>(m(0, k), m(1, k), m(2, k), m(2, k));
+    };
+    const auto packets = [&](const M3& m) {
+      return Block<Scalar>{column_of(m, 0), column_of(m, 1), column_of(m, 2)};
     };
     const Block<Scalar> g0 = packets(gamma.g0), g1 = packets(gamma.g1);
     for (int c = 0; c < kColumns; ++c) {
