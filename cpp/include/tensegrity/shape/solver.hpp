@@ -69,15 +69,16 @@ class Solver {
   Status solve(const CableLengths<Scalar>& lengths) {
     const Status input = check_lengths(lengths, prism_.rod_length);
     if (input != Status::kOk) return input;
-    Solution best{rods_, std::numeric_limits<Scalar>::max(), 0, false, false};
-    if (warm_) best = minimise(rods_, lengths, options_.max_iterations, newton_);
+    Solution best = warm_ ? minimise(rods_, lengths, options_.max_iterations, newton_) : unsolved();
+    Endcaps<Scalar> q = best.rods.endcaps();
     int iterations = best.iterations;
-    if (!warm_ || handedness(best.rods.endcaps(), prism_.moment_sign()) != Handedness::kRight) {
+    if (!warm_ || handedness(q, prism_.moment_sign()) != Handedness::kRight) {
       best = solve_cold(lengths, iterations);
       if (best.cost == std::numeric_limits<Scalar>::max()) return Status::kWrongChirality;
+      q = best.rods.endcaps();
     }
     rods_ = best.rods;
-    const Spin<Scalar> turn = spin(rods_.endcaps(), reference_);
+    const Spin<Scalar> turn = spin(q, reference_);
     rods_.rotate_about_z(turn.cosine, -turn.sine);
     endcaps_ = rods_.endcaps();
     cost_ = best.cost;
@@ -169,6 +170,10 @@ class Solver {
     bool converged;
     bool newton;  // the last steps needed second derivatives
   };
+
+  Solution unsolved() const {
+    return {rods_, std::numeric_limits<Scalar>::max(), 0, false, false};
+  }
 
   static Status check_std(Scalar value) {
     if (!std::isfinite(value)) return Status::kNotFinite;
@@ -276,7 +281,7 @@ class Solver {
     // Lengths that have no solution are fitted best on the fold itself, on neither side of it.
     const Scalar on_fold = Scalar(-0.01);
     const Scalar sign = prism_.moment_sign();
-    Solution best{rods_, std::numeric_limits<Scalar>::max(), 0, false, false};
+    Solution best = unsolved();
     bool best_is_positive = false;
     const int limit = iterations + options_.max_cold_iterations;
     for (int k = 0; k < kColdStarts && iterations < limit; ++k) {
@@ -306,18 +311,42 @@ class Solver {
                             int limit, int& iterations) const {
     const Scalar sign = prism_.moment_sign();
     if (fold(solution.rods, sign) >= 0) return solution;
-    // Along the mechanism the lengths change as s x + kappa x^2 / 2: the other root.
-    const FoldAnalysis<Scalar> analysis = analyse_fold(solution.rods);
-    if (!(std::abs(analysis.curvature) > 0)) return solution;
-    const Scalar farthest = Scalar(0.2) * prism_.rod_length;
-    const Scalar root = -2 * analysis.smallest() / analysis.curvature;
     Rods<Scalar> across = solution.rods;
-    across.retract(std::clamp(root, -farthest, farthest) * analysis.mechanism());
+    across.retract(across_fold(solution.rods, lengths));
     const Solution other = minimise(across, lengths, start_limit(limit, iterations));
     iterations += other.iterations;
     const bool as_good = other.cost < solution.cost + same_cost();
     const bool valid = handedness(other.rods.endcaps(), sign) == Handedness::kRight;
     return as_good && valid && fold(other.rods, sign) > 0 ? other : solution;
+  }
+
+  // To where along the mechanism the lengths are the same again: they change as s x + kappa x^2 / 2,
+  // with s its singular value and kappa the curvature of `analyse_fold`. Zero on the fold itself.
+  //
+  // The mechanism is found by inverse iteration on J' J: a start for `minimise` needs no more, and
+  // a decomposition takes longer than all of a solve.
+  Tangent<Scalar> across_fold(const Rods<Scalar>& rods, const CableLengths<Scalar>& lengths) const {
+    constexpr int kMaxIterations = 10;
+    constexpr Scalar kSettled = Scalar(1e-4);  // squared change of a unit vector
+    // Singular values below its root are as good as zero; positive definite on the fold as well.
+    constexpr Scalar kShift = Scalar(1e-5);
+    const Scalar farthest = Scalar(0.2) * prism_.rod_length;
+    Ldlt<Scalar, kTangent> system;
+    LengthResiduals<Scalar>(rods, lengths).equations(rods, false, system.columns());
+    for (int k = 0; k < kTangent; ++k) system.column(k)[k] += kShift;
+    if (!system.factor()) return Tangent<Scalar>::Zero();
+    Tangent<Scalar> mechanism = Tangent<Scalar>::Ones().normalized();
+    for (int k = 0; k < kMaxIterations; ++k) {
+      const Tangent<Scalar> before = mechanism;
+      mechanism = system.solve(before).normalized();
+      if ((mechanism - before).squaredNorm() < kSettled) break;
+    }
+    const Vector<Scalar, 9> stretch = length_jacobian(rods).lazyProduct(mechanism);  // s u
+    const Scalar squared = stretch.squaredNorm();
+    const Matrix<Scalar, kTangent, 9> stretched = mechanism * stretch.transpose();
+    const Scalar curvature = mechanism.dot(length_hessian_products(rods, stretched));  // s kappa
+    if (!(std::abs(curvature) > 0)) return Tangent<Scalar>::Zero();
+    return std::clamp(-2 * squared / curvature, -farthest, farthest) * mechanism;
   }
 
   Matrix<Scalar, 18> to_endcaps(const TangentMatrix<Scalar>& tangent) const {
