@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from statistics import median
 
 from results import Results, Timing
 
@@ -36,11 +37,12 @@ def three_digits(value: float) -> str:
 
 
 def spread(timing: Timing) -> str:
-    """Median and, in brackets, least and greatest."""
+    """Median and, in brackets, least and greatest; with a star where the core never was its own."""
     low, high = duration(timing.min_ns), duration(timing.max_ns)
     if low.split()[1] == high.split()[1]:
         low = low.split()[0]
-    return f"{duration(timing.median_ns)} ({low} – {high})"
+    star = "" if timing.alone else " \\*"
+    return f"{duration(timing.median_ns)} ({low} – {high}){star}"
 
 
 def thousands(count: float) -> str:
@@ -303,8 +305,24 @@ class Page:
         ]
         return table(["", "tensegrity", "peer", "peer's time", "ratio"], rows)
 
+    def company(self) -> dict[str, str]:
+        """How often repetitions had their core for themselves, and what it cost to share it."""
+        timings = self._results.times.values()
+        alone = sum(timing.alone for timing in timings)
+        whole = sum(timing.repetitions for timing in timings)
+        shared = [
+            timing.disturbed_ns / timing.median_ns
+            for timing in timings
+            if timing.alone and timing.disturbed_ns is not None
+        ]
+        said = {"repetitions with a core of their own": f"{alone} of {whole}"}
+        if shared:
+            said["the others took"] = f"{three_digits(median(shared))} × as long"
+        return said
+
     def conditions(self) -> str:
-        machine, versions = self._results.machine, self._results.versions
+        machine = self._results.machine | self.company()
+        versions = self._results.versions
         lines = [f"- {name}: {value}\n" for name, value in (machine | versions).items()]
         return "".join(lines) + "\n```\n" + "\n".join(self._results.commands) + "\n```\n"
 

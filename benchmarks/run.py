@@ -3,8 +3,9 @@
     python benchmarks/run.py             # or: make bench
     python benchmarks/run.py --resume    # after an interruption: what has finished is not repeated
 
-Times are CPU times; of each the median, least and greatest of the repetitions. Instructions are
-counted by callgrind, on the same programs.
+Times are CPU times; of each the median, least and greatest of the repetitions that had their core
+for themselves (results.py). A program is run again while too few had. Instructions are counted by
+callgrind, on the same programs.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from typing import Any
 
 import report
 from callgrind import Counts, counts, worst_calls
-from results import Results, Timing
+from results import Repetitions, Results, Timing, least_gauge, split
 
 import tensegrity.sequence
 from tensegrity.simulation import SimulationOptions, simulate
@@ -37,13 +38,14 @@ DATA = ROOT.parent / "shared" / "data"
 RECORDINGS = {"forward": "forward", "right": "right-turn"}
 """Names of recordings, and the manoeuvres that replace them where there are none."""
 RANGES = ("building45", "outdoor", "rolling_indoor")
-# Short repetitions: whoever else runs on the core then slows down all of one or none, and the
-# median is of one kind.
+# Short repetitions: whoever else runs on the core then slows down all of one or none.
 TIMING = (
-    "--benchmark_repetitions=21",
+    "--benchmark_repetitions=7",
     "--benchmark_min_time=0.03",
     "--benchmark_enable_random_interleaving=true",
 )
+ENOUGH_ALONE, MOST_RUNS = 5, 3
+"""A program is run so often at the most until of each case so many repetitions had the core."""
 # Symbols are bound at the start, not by the first call that is counted.
 COUNTING = (
     "env",
@@ -116,21 +118,42 @@ def recordings(folder: Path) -> list[Path]:
 # --- stages: each returns what is stored as JSON until the run is complete ----------------------
 
 
+Measured = dict[str, Repetitions]
+
+
+def repeat(program: Callable[[], tuple[Measured, dict[str, Any]]]) -> dict[str, Any]:
+    """Repetitions by case of as many runs as needed, and what else the last one said."""
+    measured: Measured = {}
+    for _ in range(MOST_RUNS):
+        more, rest = program()
+        for case, repetitions in more.items():
+            measured.setdefault(case, []).extend(repetitions)
+        least = least_gauge(measured.values())
+        if all(len(split(case, least)[0]) >= ENOUGH_ALONE for case in measured.values()):
+            break
+    return {"repetitions": measured, **rest}
+
+
 def time_program(where: Build, name: str, paths: list[Path]) -> dict[str, Any]:
-    """Timings by case."""
+    """Of a program in C++."""
     out = where.folder / f"{name}.google.json"
-    run([str(where.program(name)), *(map(str, paths) if name in WITH_RECORDINGS else ()),
-         f"--benchmark_out={out}", "--benchmark_out_format=json", *TIMING])  # fmt: skip
-    times: dict[str, list[float]] = {}
-    heap: dict[str, int] = {}
-    for case in json.loads(out.read_text(encoding="utf-8"))["benchmarks"]:
-        if case["run_type"] != "iteration":
-            continue
-        if case["time_unit"] != "ns":
-            raise RuntimeError(f"{case['name']}: expected nanoseconds, not {case['time_unit']}")
-        times.setdefault(case["run_name"], []).append(case["cpu_time"] / case["calls"])
-        heap[case["run_name"]] = int(case["bytes"])
-    return {"times": {case: (values, heap[case]) for case, values in times.items()}}
+
+    def program() -> tuple[Measured, dict[str, Any]]:
+        run([str(where.program(name)), *(map(str, paths) if name in WITH_RECORDINGS else ()),
+             f"--benchmark_out={out}", "--benchmark_out_format=json", *TIMING])  # fmt: skip
+        measured: Measured = {}
+        heap: dict[str, int] = {}
+        for case in json.loads(out.read_text(encoding="utf-8"))["benchmarks"]:
+            if case["run_type"] != "iteration":
+                continue
+            if case["time_unit"] != "ns":
+                raise RuntimeError(f"{case['name']}: expected nanoseconds, not {case['time_unit']}")
+            repetition = (case["cpu_time"] / case["calls"], case["gauge"])
+            measured.setdefault(case["run_name"], []).append(repetition)
+            heap[case["run_name"]] = int(case["bytes"])
+        return measured, {"heap": heap, "language": "C++"}
+
+    return repeat(program)
 
 
 def time_cycles(where: Build, paths: list[Path]) -> dict[str, Any]:
@@ -140,13 +163,14 @@ def time_cycles(where: Build, paths: list[Path]) -> dict[str, Any]:
 
 
 def time_python(name: str, paths: list[Path]) -> dict[str, Any]:
-    """Times by case and versions of peers."""
-    output = run([sys.executable, str(ROOT / "benchmarks" / "python" / name), *map(str, paths)])
-    handed_over = json.loads(output)
-    return {
-        "times": {case: (times, 0) for case, times in handed_over["times_ns"].items()},
-        "versions": handed_over["versions"],
-    }
+    """Of a program in Python, with the versions of peers."""
+
+    def program() -> tuple[Measured, dict[str, Any]]:
+        output = run([sys.executable, str(ROOT / "benchmarks" / "python" / name), *map(str, paths)])
+        handed_over = json.loads(output)
+        return handed_over.pop("repetitions"), handed_over | {"language": "Python"}
+
+    return repeat(program)
 
 
 def count(where: Build, name: str, log: Path, *arguments: str) -> Counts:
@@ -260,9 +284,14 @@ def measure(where: Build, resume: bool) -> Results:
     ]
     stages = Stages(where.folder, resume)
 
+    # By language: each has its own gauge.
+    measured: dict[str, Measured] = {"C++": {}, "Python": {}}
+    heap: dict[str, int] = {}
+
     def keep(stored: dict[str, Any]) -> None:
-        for case, (times, heap) in stored.pop("times", {}).items():
-            results.times[case] = Timing.of(times, heap)
+        if "repetitions" in stored:
+            measured[stored.pop("language")].update(stored.pop("repetitions"))
+            heap.update(stored.pop("heap", {}))
         for part, values in stored.items():
             getattr(results, part).update(values)
 
@@ -276,6 +305,10 @@ def measure(where: Build, resume: bool) -> Results:
     if ranges:
         keep(stages.run("time-calibration", lambda: time_python("calibration.py", ranges)))
     results.machine["load after"] = load()
+    for cases in filter(None, measured.values()):
+        least = least_gauge(cases.values())
+        for case, repetitions in cases.items():
+            results.times[case] = Timing.of(repetitions, least, heap.get(case, 0))
     # Counts do not care.
     counting_stages: dict[str, Callable[[], dict[str, Any]]] = {
         **{

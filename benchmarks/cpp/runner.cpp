@@ -1,10 +1,39 @@
 #include "runner.hpp"
 
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
+
+#include "tensegrity/types.hpp"
 
 namespace tensegrity::benchmarks {
+
+double gauge() {
+  constexpr std::size_t kBlocks = 31;
+  constexpr int kProducts = 40;
+  Matrix<double, 12> a, product;
+  a.setConstant(0.5);
+  hide(a);
+  std::array<double, kBlocks> blocks;
+  const auto cpu_time = [] {
+    std::timespec now;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return 1e9 * double(now.tv_sec) + double(now.tv_nsec);
+  };
+  for (double& block : blocks) {
+    const double begin = cpu_time();
+    for (int k = 0; k < kProducts; ++k) {
+      product = a.lazyProduct(a);
+      hide(product);
+    }
+    block = cpu_time() - begin;
+  }
+  // Of the middle one: an interruption lengthens a few.
+  std::nth_element(blocks.begin(), blocks.begin() + kBlocks / 2, blocks.end());
+  return blocks[kBlocks / 2] / kProducts;
+}
 
 Program::Program(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);

@@ -5,6 +5,7 @@
 #include <benchmark/benchmark.h>
 #include <valgrind/valgrind.h>
 
+#include <algorithm>
 #include <functional>
 #include <regex>
 #include <string>
@@ -27,6 +28,11 @@ void hide(Case& it) {
   benchmark::DoNotOptimize(address);
   benchmark::ClobberMemory();
 }
+
+// How long a fixed piece of work takes at this moment [ns]: longer while another thread computes on
+// the same core. Threads share a core's units, so that even work that is timed by its own CPU time
+// takes up to twice as long then.
+double gauge();
 
 // Has callgrind write its counter of instructions to its log.
 inline void mark() { VALGRIND_MONITOR_COMMAND("status internal"); }
@@ -62,11 +68,13 @@ class Program {
     }
     benchmark::RegisterBenchmark(name.c_str(), [prepare, repeats](benchmark::State& state) {
       auto call = prepare();
+      const double before = gauge();
       for (auto _ : state) {
         hide(call);
         call();
       }
       hide(call);
+      state.counters["gauge"] = std::max(before, gauge());
       state.counters["calls"] = repeats.calls;
       state.counters["bytes"] = repeats.bytes;
     });

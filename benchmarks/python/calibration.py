@@ -32,7 +32,7 @@ def main() -> None:
         )
         for path in arguments.recordings
     ]
-    hand_over(measure(cases, repeats=3))
+    hand_over(measure(cases, repeats=5))
 
 
 if __name__ == "__main__":

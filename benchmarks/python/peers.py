@@ -27,7 +27,7 @@ import numpy as np
 from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from timing import Case, hand_over, measure
+from timing import Case, Repetitions, hand_over, measure
 
 from tensegrity import _core
 from tensegrity.ahrs import Madgwick
@@ -50,7 +50,7 @@ CABLES = ((0, 4), (0, 2), (2, 4), (1, 5), (1, 3), (3, 5), (1, 4), (0, 3), (2, 5)
 # --- contact-aided invariant filter -------------------------------------------------------------
 
 
-def filters() -> dict[str, list[float]]:
+def filters() -> dict[str, Repetitions]:
     """A robot that stands still, called as each package is meant to be called from Python.
 
     Corrections without a sample in between would wear out the covariance: what is timed is both,
@@ -91,12 +91,15 @@ def filters() -> dict[str, list[float]]:
             cases.append(
                 Case(f"peers/propagate/{contacts}/{package}", predict, motion | names, setup=both)
             )
-    times = measure(cases)
-    for name in [name for name in times if name.startswith("both/")]:
+    measured = measure(cases)
+    for name in [name for name in measured if name.startswith("both/")]:
         case = name.removeprefix("both/")
-        pairs = zip(times.pop(name), times[f"peers/propagate/{case}"], strict=True)
-        times[f"peers/correct/{case}"] = [both - propagate for both, propagate in pairs]
-    return times
+        pairs = zip(measured.pop(name), measured[f"peers/propagate/{case}"], strict=True)
+        measured[f"peers/correct/{case}"] = [
+            (both - propagate, max(gauge, its_gauge))
+            for (both, gauge), (propagate, its_gauge) in pairs
+        ]
+    return measured
 
 
 def standing_filter(feet: tuple[int, ...], endcaps: Array) -> _core.InvariantFilter:
@@ -308,12 +311,12 @@ def main() -> None:
     )
     parser.add_argument("recording", type=Path)
     arguments = parser.parse_args()
-    times = filters()
+    measured = filters()
     for cases in (shapes(read(arguments.recording)), unscented(), orientation()):
-        times |= measure(cases)
+        measured |= measure(cases)
     packages = ("gtsam", "casadi", "scipy", "filterpy", "ahrs", "numpy")
     versions = {name: version(name) for name in packages}
-    hand_over(times, versions | {"Ipopt of casadi": ipopt_of_casadi()})
+    hand_over(measured, versions | {"Ipopt of casadi": ipopt_of_casadi()})
 
 
 if __name__ == "__main__":

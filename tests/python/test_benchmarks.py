@@ -56,5 +56,23 @@ def test_a_spread_has_one_unit_where_it_can() -> None:
     from report import spread
     from results import Timing
 
-    assert spread(Timing.of([1500.0, 1200.0, 1800.0])) == "1.50 µs (1.20 – 1.80 µs)"
-    assert spread(Timing.of([900.0, 1000.0, 1100.0])) == "1.00 µs (900 ns – 1.10 µs)"
+    def shown(*times: float) -> str:
+        return spread(Timing.of([(time, 1.0) for time in times], least=1.0))
+
+    assert shown(1500.0, 1200.0, 1800.0) == "1.50 µs (1.20 – 1.80 µs)"
+    assert shown(900.0, 1000.0, 1100.0) == "1.00 µs (900 ns – 1.10 µs)"
+
+
+def test_repetitions_on_a_shared_core_do_not_count() -> None:
+    from report import spread
+    from results import Timing, least_gauge
+
+    repetitions = [(100.0, 10.0), (104.0, 11.4), (102.0, 10.2), (170.0, 13.0), (150.0, 11.6)]
+    least = least_gauge([repetitions, [(1.0, 20.0)]])
+    timing = Timing.of(repetitions, least)
+    assert (timing.median_ns, timing.min_ns, timing.max_ns) == (102.0, 100.0, 104.0)
+    assert (timing.alone, timing.repetitions, timing.disturbed_ns) == (3, 5, 160.0)
+
+    never = Timing.of([(1.0, 20.0), (2.0, 30.0)], least)
+    assert (never.median_ns, never.alone) == (1.5, 0)
+    assert spread(never).endswith("*")

@@ -22,9 +22,7 @@ class Transition {
   // those after the body's see no error of the gyro, but for those of `set_group`.
   Transition(const Strapdown<Scalar>& body, Scalar gyro_std, Scalar accel_std, int rows)
       : body_(body), gyro_variance_(gyro_std * gyro_std), accel_variance_(accel_std * accel_std) {
-    for (int k = 0; k < 3; ++k) {
-      for (int row = kBody; row < rows; row += 4) Packet<Scalar>().store(&by_(row, k));
-    }
+    for (int k = 0; k < 3; ++k) set_zero(&by_(kBody, k), &by_(0, k) + rows);
     for (int k = 0; k < 3; ++k) {
       const std::size_t column = std::size_t(k);
       const Packet<Scalar> by_int_r = Scalar(-1) * body.int_r[column];

@@ -208,4 +208,13 @@ class Packet {
   Register part_[kRegisters] = {};
 };
 
+// Zeros in the packets from `rows` to `end`. GCC would call memset for them, which takes longer for
+// arrays as short as these.
+template <typename Scalar>
+void set_zero(Scalar* rows, Scalar* end) {
+  Packet<Scalar> zero;
+  zero.hold();
+  for (; rows != end; rows += 4) zero.store(rows);
+}
+
 }  // namespace tensegrity

@@ -171,9 +171,7 @@ class Solver {
     bool newton;  // the last steps needed second derivatives
   };
 
-  Solution unsolved() const {
-    return {rods_, std::numeric_limits<Scalar>::max(), 0, false, false};
-  }
+  Solution unsolved() const { return {rods_, std::numeric_limits<Scalar>::max(), 0, false, false}; }
 
   static Status check_std(Scalar value) {
     if (!std::isfinite(value)) return Status::kNotFinite;
@@ -320,8 +318,9 @@ class Solver {
     return as_good && valid && fold(other.rods, sign) > 0 ? other : solution;
   }
 
-  // To where along the mechanism the lengths are the same again: they change as s x + kappa x^2 / 2,
-  // with s its singular value and kappa the curvature of `analyse_fold`. Zero on the fold itself.
+  // To where along the mechanism the lengths are the same again: they change as s x + kappa x^2 /
+  // 2, with s its singular value and kappa the curvature of `analyse_fold`. Zero on the fold
+  // itself.
   //
   // The mechanism is found by inverse iteration on J' J: a start for `minimise` needs no more, and
   // a decomposition takes longer than all of a solve.

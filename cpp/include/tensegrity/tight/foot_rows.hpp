@@ -16,9 +16,7 @@ class FootRows {
   using P = Packet<Scalar>;
   static constexpr int kBlocks = 3;  // of the slip, and of the height
 
-  FootRows() {
-    for (int i = 0; i < 3 * kBlocks; ++i) P().store(h_[i]);
-  }
+  FootRows() { set_zero(h_[0], h_[3 * kBlocks]); }
 
   // Columns at .. at + 2 of the slip's rows: vectors of three. Blocks in which the one across the
   // ground is zero come last.

@@ -28,7 +28,9 @@ class SequentialUpdate {
   using B = Belief<Scalar>;
   using P = Packet<Scalar>;
 
-  explicit SequentialUpdate(B& belief) : belief_(belief) {}
+  explicit SequentialUpdate(B& belief) : belief_(belief) {
+    set_zero(error_.data(), error_.data() + B::Dim);
+  }
   // Takes the collected error out of the mean, if any row was applied.
   ~SequentialUpdate() {
     if (waiting_ == 0) return;  // every applied row waits, also after a full batch was taken
@@ -189,9 +191,9 @@ class SequentialUpdate {
   }
 
   B& belief_;
-  typename B::ErrorVector error_ = B::ErrorVector::Zero();  // of the rows of full batches
-  Matrix<Scalar, B::Dim, kCapacity> crosses_;               // P H', in the end C
-  Matrix<Scalar, kCapacity> g_;                             // G below its diagonal
+  typename B::ErrorVector error_;              // of the rows of full batches
+  Matrix<Scalar, B::Dim, kCapacity> crosses_;  // P H', in the end C
+  Matrix<Scalar, kCapacity> g_;                // G below its diagonal
   // By row: 1 / its diagonal element of G, y, and the part of the downdate that is applied.
   Scalar inverse_[kCapacity], y_[kCapacity], information_[kCapacity];
   int waiting_ = 0;
