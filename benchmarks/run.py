@@ -19,6 +19,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -44,8 +45,8 @@ TIMING = (
     "--benchmark_min_time=0.03",
     "--benchmark_enable_random_interleaving=true",
 )
-ENOUGH_ALONE, MOST_RUNS = 5, 3
-"""A program is run so often at the most until of each case so many repetitions had the core."""
+ENOUGH_ALONE, PATIENCE_S = 5, 20.0
+"""A program is run again until of each case so many repetitions had the core, or so long."""
 # Symbols are bound at the start, not by the first call that is counted.
 COUNTING = (
     "env",
@@ -121,20 +122,24 @@ def recordings(folder: Path) -> list[Path]:
 Measured = dict[str, Repetitions]
 
 
-def repeat(program: Callable[[], tuple[Measured, dict[str, Any]]]) -> dict[str, Any]:
-    """Repetitions by case of as many runs as needed, and what else the last one said."""
+def repeat(
+    program: Callable[[], tuple[Measured, dict[str, Any]]], before: Measured
+) -> dict[str, Any]:
+    """Repetitions by case of as many runs as needed, and what else the last one said. ``before``:
+    what the run has measured by the same gauge."""
     measured: Measured = {}
-    for _ in range(MOST_RUNS):
+    began = time.monotonic()
+    while True:
         more, rest = program()
         for case, repetitions in more.items():
             measured.setdefault(case, []).extend(repetitions)
-        least = least_gauge(measured.values())
-        if all(len(split(case, least)[0]) >= ENOUGH_ALONE for case in measured.values()):
-            break
-    return {"repetitions": measured, **rest}
+        least = least_gauge([*before.values(), *measured.values()])
+        enough = all(len(split(case, least)[0]) >= ENOUGH_ALONE for case in measured.values())
+        if enough or time.monotonic() - began > PATIENCE_S:
+            return {"repetitions": measured, **rest}
 
 
-def time_program(where: Build, name: str, paths: list[Path]) -> dict[str, Any]:
+def time_program(where: Build, name: str, paths: list[Path], before: Measured) -> dict[str, Any]:
     """Of a program in C++."""
     out = where.folder / f"{name}.google.json"
 
@@ -153,7 +158,7 @@ def time_program(where: Build, name: str, paths: list[Path]) -> dict[str, Any]:
             heap[case["run_name"]] = int(case["bytes"])
         return measured, {"heap": heap, "language": "C++"}
 
-    return repeat(program)
+    return repeat(program, before)
 
 
 def time_cycles(where: Build, paths: list[Path]) -> dict[str, Any]:
@@ -162,7 +167,7 @@ def time_cycles(where: Build, paths: list[Path]) -> dict[str, Any]:
     return {"cycles": json.loads(output)}
 
 
-def time_python(name: str, paths: list[Path]) -> dict[str, Any]:
+def time_python(name: str, paths: list[Path], before: Measured) -> dict[str, Any]:
     """Of a program in Python, with the versions of peers."""
 
     def program() -> tuple[Measured, dict[str, Any]]:
@@ -170,7 +175,7 @@ def time_python(name: str, paths: list[Path]) -> dict[str, Any]:
         handed_over = json.loads(output)
         return handed_over.pop("repetitions"), handed_over | {"language": "Python"}
 
-    return repeat(program)
+    return repeat(program, before)
 
 
 def count(where: Build, name: str, log: Path, *arguments: str) -> Counts:
@@ -297,13 +302,25 @@ def measure(where: Build, resume: bool) -> Results:
 
     # Times one after the other, so that they do not disturb each other.
     for name in PROGRAMS:
-        keep(stages.run(f"time-{name}", lambda name=name: time_program(where, name, paths)))
+        keep(
+            stages.run(
+                f"time-{name}",
+                lambda name=name: time_program(where, name, paths, measured["C++"]),
+            )
+        )
     keep(stages.run("time-cycles", lambda: time_cycles(where, paths)))
-    keep(stages.run("time-replay", lambda: time_python("replay.py", paths)))
-    keep(stages.run("time-peers", lambda: time_python("peers.py", paths[-1:])))
-    ranges = [path for name in RANGES if (path := DATA / "superball" / name).is_dir()]
-    if ranges:
-        keep(stages.run("time-calibration", lambda: time_python("calibration.py", ranges)))
+    python = {"replay": paths, "peers": paths[-1:]}
+    if ranges := [path for name in RANGES if (path := DATA / "superball" / name).is_dir()]:
+        python["calibration"] = ranges
+    for name, folders in python.items():
+        keep(
+            stages.run(
+                f"time-{name}",
+                lambda name=name, folders=folders: time_python(
+                    f"{name}.py", folders, measured["Python"]
+                ),
+            )
+        )
     results.machine["load after"] = load()
     for cases in filter(None, measured.values()):
         least = least_gauge(cases.values())
