@@ -322,8 +322,10 @@ def measure(where: Build, resume: bool) -> Results:
             )
         )
     results.machine["load after"] = load()
-    for cases in filter(None, measured.values()):
+    for language, cases in measured.items():
         least = least_gauge(cases.values())
+        # How fast the machine was: comparable from run to run.
+        results.machine[f"least gauge, {language}"] = report.duration(least)
         for case, repetitions in cases.items():
             results.times[case] = Timing.of(repetitions, least, heap.get(case, 0))
     # Counts do not care.

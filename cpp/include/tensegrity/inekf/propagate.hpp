@@ -26,9 +26,10 @@ struct Rolling {
 // `extra_walk`: random walk of each extra state [unit/sqrt(s)]. Walks of a step are added at its
 // end.
 template <typename B, typename Scalar = typename B::Scalar>
-void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt, Scalar gravity,
-               const ProcessNoise<Scalar>& noise, const Rolling<Scalar>& rolling,
-               const Vector<Scalar, B::Extra>& extra_walk) {
+TENSEGRITY_FLATTEN void propagate(B& belief, const ImuSample<Scalar>& imu, Scalar dt,
+                                  Scalar gravity, const ProcessNoise<Scalar>& noise,
+                                  const Rolling<Scalar>& rolling,
+                                  const Vector<Scalar, B::Extra>& extra_walk) {
   using V3 = Vector3<Scalar>;
   using M3 = Matrix3<Scalar>;
   const ImuSample<Scalar> motion{imu.gyro - belief.gyro_bias, imu.accel - belief.accel_bias};

@@ -8,6 +8,14 @@
 #include <Eigen/Core>
 #include <algorithm>
 
+// Before a function that runs all the time: it takes in all that it calls, so that what these hand
+// on stays in registers. Not where code has to be small, as where there is no SIMD.
+#ifdef EIGEN_VECTORIZE
+#define TENSEGRITY_FLATTEN __attribute__((flatten))
+#else
+#define TENSEGRITY_FLATTEN
+#endif
+
 namespace tensegrity {
 
 // The next multiple of four.

@@ -192,8 +192,9 @@ class Solver {
 
   // One descent from `start` to a local minimum in at most `limit` iterations. `newton`: take
   // second derivatives from the start.
-  Solution minimise(const Rods<Scalar>& start, const CableLengths<Scalar>& lengths, int limit,
-                    bool newton = false) const {
+  TENSEGRITY_FLATTEN Solution minimise(const Rods<Scalar>& start,
+                                       const CableLengths<Scalar>& lengths, int limit,
+                                       bool newton = false) const {
     const Scalar initial_damping = Scalar(1e-3);
     // Beyond this no second-order model of the lengths holds.
     const Scalar max_step = Scalar(0.3) * prism_.rod_length;

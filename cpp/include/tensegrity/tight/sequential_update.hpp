@@ -151,7 +151,7 @@ class SequentialUpdate {
     }
   }
 
-  void downdate() {
+  TENSEGRITY_FLATTEN void downdate() {
     const int count = waiting_;
     pad();
     for (int j = 0; j < count; j += 4) whiten(j);
