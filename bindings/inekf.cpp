@@ -62,8 +62,8 @@ void bind_inekf(py::module_& m) {
 
   py::class_<Belief>(m, "InvariantFilter",
                      "Mean on SE_{2+N}(3) x R^7 (biases and the spin angle) and covariance of the "
-                     "right-invariant error (rotation, velocity, position, gyro bias, "
-                     "accelerometer bias, spin, contacts).")
+                     "right-invariant error (gyro bias, accelerometer bias, rotation, "
+                     "velocity, position, spin, contacts).")
       .def(py::init<>())
       .def_readwrite("rotation", &Belief::rotation, "R (3, 3), body to world")
       .def_readwrite("velocity", &Belief::velocity, "v (3,), world [m/s]")

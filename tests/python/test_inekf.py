@@ -18,6 +18,12 @@ from scipy.spatial.transform import Rotation
 
 from tensegrity import _core
 
+# Blocks of the error; contact points follow.
+GYRO_BIAS, ACCEL_BIAS = slice(0, 3), slice(3, 6)
+ROTATION, VELOCITY, POSITION = slice(6, 9), slice(9, 12), slice(12, 15)
+SPIN = 15
+BIASES, BODY = slice(0, 6), slice(6, 15)
+
 GRAVITY = np.array([0.0, 0.0, -9.81])
 NOISE = {
     "gyro_std": 0.002,
@@ -43,7 +49,8 @@ def algebra(xi):
 
 
 class DenseFilter:
-    """X as a matrix, theta = (b_g, b_a, phi); error (xi_R, xi_v, xi_p, zeta, xi_d...)."""
+    """X as a matrix, theta = (b_g, b_a, phi); error (zeta_bg, zeta_ba, xi_R, xi_v, xi_p, zeta_phi,
+    xi_d...)."""
 
     def __init__(self, rotation, velocity, position, gyro_bias, accel_bias, spin, covariance):
         self.x = np.eye(5)
@@ -60,7 +67,7 @@ class DenseFilter:
 
     def group_rows(self):
         """Rows of the error that belong to the group, in the order of X's columns."""
-        return list(range(9)) + list(range(16, 16 + 3 * len(self.ids)))
+        return list(range(6, 15)) + list(range(16, 16 + 3 * len(self.ids)))
 
     def adjoint(self):
         """Ad_X on the group part, identity on theta."""
@@ -82,21 +89,22 @@ class DenseFilter:
         n, contacts = len(self.p), len(self.ids)
         # Left-invariant error dynamics (Hartley et al. 2020, eq. 70).
         system = np.zeros((n, n))
-        system[0:3, 0:3] = system[3:6, 3:6] = system[6:9, 6:9] = -hat(w)
-        system[3:6, 0:3] = -hat(a)
-        system[6:9, 3:6] = np.eye(3)
-        system[0:3, 9:12] = system[3:6, 12:15] = -np.eye(3)
+        for block in (ROTATION, VELOCITY, POSITION):
+            system[block, block] = -hat(w)
+        system[VELOCITY, ROTATION] = -hat(a)
+        system[POSITION, VELOCITY] = np.eye(3)
+        system[ROTATION, GYRO_BIAS] = system[VELOCITY, ACCEL_BIAS] = -np.eye(3)
         walk = np.zeros(n)
-        walk[9:12] = NOISE["gyro_bias_walk"]
-        walk[12:15] = NOISE["accel_bias_walk"]
-        walk[15] = NOISE["spin_walk"]
+        walk[GYRO_BIAS] = NOISE["gyro_bias_walk"]
+        walk[ACCEL_BIAS] = NOISE["accel_bias_walk"]
+        walk[SPIN] = NOISE["spin_walk"]
         for i in range(contacts):
             s = slice(16 + 3 * i, 19 + 3 * i)
             system[s, s] = -hat(w)
             walk[s] = NOISE["anchor_walk"]
         phi = expm(system * dt)
-        by_sample = phi[:, 9:15].copy()
-        by_sample[9:15] = 0
+        by_sample = phi[:, BIASES].copy()
+        by_sample[BIASES] = 0
         variance = np.repeat([NOISE["gyro_std"] ** 2, NOISE["accel_std"] ** 2], 3)
         noise = by_sample @ np.diag(variance) @ by_sample.T + np.diag(walk**2 * dt)
 
@@ -118,8 +126,8 @@ class DenseFilter:
     def augment(self, endcap, h, h_covariance):
         n = len(self.p)
         f = np.vstack([np.eye(n), np.zeros((3, n))])
-        f[n:, 6:9] = np.eye(3)
-        f[n:, 15] = self.rotation @ np.cross([0, 0, 1], h)
+        f[n:, POSITION] = np.eye(3)
+        f[n:, SPIN] = self.rotation @ np.cross([0, 0, 1], h)
         g = np.zeros((n + 3, 3))
         g[n:] = self.rotation
         self.p = f @ self.p @ f.T + g @ h_covariance @ g.T
@@ -145,8 +153,8 @@ class DenseFilter:
         noise = np.zeros((3 * contacts, 3 * contacts))
         for k, i in enumerate(self.ids):
             s = slice(3 * k, 3 * k + 3)
-            jacobian[s, 6:9] = np.eye(3)
-            jacobian[s, 15] = self.rotation @ np.cross([0, 0, 1], h[i])
+            jacobian[s, POSITION] = np.eye(3)
+            jacobian[s, SPIN] = self.rotation @ np.cross([0, 0, 1], h[i])
             jacobian[s, 16 + 3 * k : 19 + 3 * k] = -np.eye(3)
             residual[s] = self.rotation @ h[i] + self.x[:3, 4] - self.x[:3, 5 + k]
             for m, j in enumerate(self.ids):
@@ -161,9 +169,9 @@ class DenseFilter:
         a = np.eye(n) - gain @ jacobian
         self.p = a @ self.p @ a.T + gain @ noise @ gain.T
         self.x = expm(algebra(-error[self.group_rows()])) @ self.x
-        self.bg = self.bg - error[9:12]
-        self.ba = self.ba - error[12:15]
-        self.spin = self.spin - error[15]
+        self.bg = self.bg - error[GYRO_BIAS]
+        self.ba = self.ba - error[ACCEL_BIAS]
+        self.spin = self.spin - error[SPIN]
 
 
 def random_covariance(rng, n, scale):
@@ -172,7 +180,8 @@ def random_covariance(rng, n, scale):
 
 
 def random_start(rng):
-    scale = np.concatenate([np.full(3, 0.1), np.full(3, 0.2), np.full(3, 0.1), np.full(7, 0.02)])
+    scale = np.full(16, 0.02)
+    scale[ROTATION], scale[VELOCITY], scale[POSITION] = 0.1, 0.2, 0.1
     return {
         "rotation": Rotation.random(random_state=int(rng.integers(1 << 30))).as_matrix(),
         "velocity": rng.normal(size=3),
@@ -257,10 +266,10 @@ def relative_error(bar, other):
     columns = xi[:3, 3:].T.ravel()
     return np.concatenate(
         [
-            [xi[2, 1], xi[0, 2], xi[1, 0]],
-            columns[:6],
             bar.gyro_bias - other.gyro_bias,
             bar.accel_bias - other.accel_bias,
+            [xi[2, 1], xi[0, 2], xi[1, 0]],
+            columns[:6],
             [bar.spin - other.spin],
             columns[6:],
         ]
@@ -366,10 +375,9 @@ def transform(start, yaw, shift):
     """The same start seen from a world that is turned about gravity and shifted."""
     turn = Rotation.from_rotvec([0, 0, yaw]).as_matrix()
     ad = np.eye(16)
-    for at, column in ((3, np.zeros(3)), (6, shift)):
-        ad[at : at + 3, :3] = hat(column) @ turn
-        ad[at : at + 3, at : at + 3] = turn
-    ad[:3, :3] = turn
+    for block in (ROTATION, VELOCITY, POSITION):
+        ad[block, block] = turn
+    ad[POSITION, ROTATION] = hat(shift) @ turn
     moved = dict(start)
     moved["rotation"] = turn @ start["rotation"]
     moved["velocity"] = turn @ start["velocity"]
@@ -407,7 +415,7 @@ def test_invariance_under_shift_and_turn_about_gravity(radius):
     full[:16, :16] = ad
     for slot in range(len(a.anchor_ids)):
         at = 16 + 3 * slot
-        full[at : at + 3, :3] = hat(shift) @ turn
+        full[at : at + 3, ROTATION] = hat(shift) @ turn
         full[at : at + 3, at : at + 3] = turn
     np.testing.assert_allclose(b.covariance, full @ a.covariance @ full.T, atol=1e-9)
 
@@ -431,9 +439,9 @@ def test_propagated_covariance_against_monte_carlo():
             f.propagate(
                 gyro[k] + rng.normal(size=3) * 0.1, accel[k] + rng.normal(size=3), dt, noise
             )
-        errors.append(relative_error(f, reference)[:9])
+        errors.append(relative_error(f, reference)[BODY])
     sampled = np.cov(np.array(errors).T)
-    predicted = reference.covariance[:9, :9]
+    predicted = reference.covariance[BODY, BODY]
     # Whitened, the sampled covariance is the identity up to its own scatter sqrt(2 / runs).
     whiten = np.linalg.inv(np.linalg.cholesky(predicted))
     np.testing.assert_allclose(whiten @ sampled @ whiten.T, np.eye(9), atol=6 * np.sqrt(2 / runs))

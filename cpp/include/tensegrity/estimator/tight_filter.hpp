@@ -183,9 +183,10 @@ class TightFilter {
     belief_.columns.col(0).setZero();
     belief_.rate.setZero();
     const Endcaps<Scalar> h = belief_.endcaps_body();
-    p.template topRows<Belief::kGyroBias>().setZero();
-    p.template leftCols<Belief::kGyroBias>().setZero();
-    p.diagonal().template head<Belief::kPosition>().setOnes();
+    constexpr int kMoved = Belief::kBodyEnd - Belief::kRotation;
+    p.template middleRows<kMoved>(Belief::kRotation).setZero();
+    p.template middleCols<kMoved>(Belief::kRotation).setZero();
+    p.diagonal().template segment<kMoved>(Belief::kRotation).setOnes();
     p.diagonal().template segment<3>(Belief::kPosition).setConstant(before);
     tight::place_endcaps(belief_, h, kLostShapeStd, kLostSpinStd, Scalar(1));
     loaded_.fill(false);

@@ -5,13 +5,14 @@
 //        theta = (b_g, b_a, extra). `extra` belongs to the measurement model: the loosely coupled
 //        filter keeps the spin angle phi there, a tightly coupled one the shape and its rates.
 // Error: Xbar X^-1 = exp(xi) and thetabar - theta, so that
-//        e = (xi_R, xi_v, xi_p, zeta_bg, zeta_ba, zeta_extra, xi_d1 .. xi_dN).
+//        e = (zeta_bg, zeta_ba, xi_R, xi_v, xi_p, zeta_extra, xi_d1 .. xi_dN).
 // Contact points come last: adding and removing one moves nothing else.
 #pragma once
 
 #include <array>
 #include <cmath>
 
+#include "tensegrity/inekf/body_error.hpp"
 #include "tensegrity/inekf/column_covariance.hpp"
 #include "tensegrity/math/so3.hpp"
 #include "tensegrity/math/symmetric.hpp"
@@ -19,19 +20,14 @@
 namespace tensegrity::inekf {
 
 template <typename Scalar_, int Extra_, int MaxAnchors_ = 6>
-struct Belief {
+struct Belief : BodyError {
   using Scalar = Scalar_;
   static constexpr int Extra = Extra_;
   static constexpr int MaxAnchors = MaxAnchors_;
 
-  // Where each block of the error starts.
-  static constexpr int kRotation = 0;
-  static constexpr int kVelocity = 3;
-  static constexpr int kPosition = 6;
-  static constexpr int kGyroBias = 9;
-  static constexpr int kAccelBias = 12;
-  static constexpr int kExtra = 15;
-  static constexpr int kAnchors = 15 + Extra;
+  // Where the error's further blocks start.
+  static constexpr int kExtra = kBodyEnd;
+  static constexpr int kAnchors = kExtra + Extra;
   static constexpr int MaxDim = kAnchors + 3 * MaxAnchors;
 
   // Of the leading dim() x dim() block, what is on and below the diagonal; beyond it all is zero.

@@ -32,52 +32,40 @@ TENSEGRITY_FLATTEN void propagate(B& belief, const ImuSample<Scalar>& imu, Scala
                                   const Vector<Scalar, B::Extra>& extra_walk) {
   using V3 = Vector3<Scalar>;
   using M3 = Matrix3<Scalar>;
+  auto& p = belief.covariance;
+  const int n = belief.dim(), rows = padded(n);
+  // Needs nothing of the integration, which is a long chain: they overlap.
+  fall_and_move(p, gravity * dt, dt, rows);
   const ImuSample<Scalar> motion{imu.gyro - belief.gyro_bias, imu.accel - belief.accel_bias};
   const Strapdown<Scalar> body =
       integrate(belief.rotation, belief.velocity, belief.position, motion, dt, gravity);
 
-  // Contact points begin in this row, or up to three after it; of the columns before it, and of the
-  // body's, the part above the diagonal is read.
-  constexpr int kGroup = packet_start(B::kAnchors), kBody = std::max(padded(B::kExtra), kGroup);
-  auto& p = belief.covariance;
-  const int n = belief.dim(), rows = padded(n);
-  const int anchors = belief.anchor_count;
-  const V3 up = V3::UnitZ();
-
   // Contact points: d+ = d + r turn x e_z, and the touching point d - r e_z is what turns with R,
   //   xi_d+ = xi_d + r turn x (e_z x xi_R) - int (d - r e_z) x R zeta_g
-  // The first of the two, by itself: no other error sees it in this step.
+  using Covariance = typename B::Covariance;
+  constexpr int kRows = Covariance::RowsAtCompileTime;
+  const int anchors = belief.anchor_count;
+  const V3 up = V3::UnitZ();
   if (rolling.radius > 0) {
     // Integral of R w: w is an eigenvector of Exp(w t).
     const V3 turn = belief.rotation * motion.gyro * dt;
     belief.anchors.leftCols(anchors).colwise() += rolling.radius * turn.cross(up);
     const M3 by_rotation = rolling.radius * hat(turn) * hat(up);
-    belief.complete();
-    for (int i = 0; i < anchors; ++i) {
-      add_columns(p, B::anchor_index(i), B::kRotation, by_rotation, 0, rows);
-    }
-    for (int j = 0; j < n; ++j) {
-      const V3 rolled = by_rotation * p.col(j).template head<3>();
-      for (int i = 0; i < anchors; ++i) {
-        p.col(j).template segment<3>(B::anchor_index(i)) += rolled;
-      }
-    }
-  } else {
-    mirror(p, kBody);
+    const Block<Scalar> by = {Packet<Scalar>(by_rotation.col(0)),
+                              Packet<Scalar>(by_rotation.col(1)),
+                              Packet<Scalar>(by_rotation.col(2))};
+    Shear<Scalar, kRows> roll(B::kRotation);
+    roll.clear(packet_start(B::kAnchors), rows);
+    for (int i = 0; i < anchors; ++i) roll.set(B::anchor_index(i), by);
+    roll.apply(p, B::kAnchors, n, rows);
   }
-
-  // ---- P F'
-  Transition<Scalar, B::Covariance::RowsAtCompileTime> transition(body, noise.gyro, noise.accel,
-                                                                  rows);
+  SensorErrors<Scalar, kRows> errors(body, noise.gyro, noise.accel);
+  errors.clear(padded(B::kBodyEnd), rows);
   for (int i = 0; i < anchors; ++i) {
     const V3 touching = belief.anchors.col(i) - rolling.radius * up;
-    transition.set_group(B::anchor_index(i), body.column_by_gyro(Packet<Scalar>(touching)));
+    errors.set_group(B::anchor_index(i), body.column_by_gyro(Packet<Scalar>(touching)));
   }
-  transition.body_columns(p, rows);
-  for (int i = 0; i < anchors; ++i) transition.group_columns(p, B::anchor_index(i), rows);
-
-  // ---- F (P F')
-  transition.all_rows(p, kGroup, n);
+  errors.apply(p, n, rows);
 
   const auto walk = [&](int at, int size, Scalar std) {
     for (int k = at; k < at + size; ++k) p(k, k) += std * std * dt;

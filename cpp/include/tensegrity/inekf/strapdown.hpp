@@ -28,8 +28,6 @@ struct ImuSample {
 // a gyro error does to v and p through the rotation: derivatives of Gamma_1 a and Gamma_2 a.
 template <typename Scalar>
 struct Strapdown {
-  Scalar dt;            // [s]
-  Scalar fall;          // |g| dt [m/s]: g x xi_R dt = fall (xi_Ry, -xi_Rx, 0)
   Block<Scalar> int_r;  // int R [s]; by the accelerometer xi_v gets -int_r zeta_a
   Block<Scalar> velocity_by_gyro, position_by_gyro;
   Block<Scalar> position_by_accel;
@@ -85,8 +83,6 @@ Strapdown<Scalar> integrate(Matrix3<Scalar>& rotation, Velocity&& velocity, Posi
   const P y = turned(r, x), force = turned(r, a);
   const P y2 = c.c2 * y, dt_y3 = dt * c.c3 * y, dt2_y4 = dt2 * c.c4 * y;
   Strapdown<Scalar> s;
-  s.dt = dt;
-  s.fall = gravity * dt;
   Block<Scalar> next, r_g2;  // R Gamma_0, R Gamma_2 dt^2
   for (int j = 0; j < 3; ++j) {
     const std::size_t k = std::size_t(j);

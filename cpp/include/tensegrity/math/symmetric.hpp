@@ -10,40 +10,16 @@
 
 namespace tensegrity {
 
-// Columns `to` .. `to + 2` of P get those of `from` times m': P <- P (I + m at rows `to`, columns
-// `from`)'. Rows `first` to `end` (multiples of four).
-template <typename Derived, typename Block>
-void add_columns(Eigen::MatrixBase<Derived>& p, int to, int from, const Eigen::MatrixBase<Block>& m,
-                 int first, int end) {
-  using Scalar = typename Derived::Scalar;
-  constexpr int kStride = Derived::RowsAtCompileTime;
-  Scalar* target = &p.derived().coeffRef(0, to);
-  const Scalar* source = &p.derived().coeffRef(0, from);
-  // Numbers by themselves, not in memory that the loop may write to.
-  const Scalar m00 = m(0, 0), m01 = m(0, 1), m02 = m(0, 2);
-  const Scalar m10 = m(1, 0), m11 = m(1, 1), m12 = m(1, 2);
-  const Scalar m20 = m(2, 0), m21 = m(2, 1), m22 = m(2, 2);
-  for (int i = first; i < end; i += 4) {
-    const Packet<Scalar> a(source + i), b(source + i + kStride), c(source + i + 2 * kStride);
-    Packet<Scalar> x(target + i), y(target + i + kStride), z(target + i + 2 * kStride);
-    x.add(m00, a), y.add(m10, a), z.add(m20, a);
-    x.add(m01, b), y.add(m11, b), z.add(m21, b);
-    x.add(m02, c), y.add(m12, c), z.add(m22, c);
-    x.store(target + i);
-    y.store(target + i + kStride);
-    z.store(target + i + 2 * kStride);
-  }
-}
-
-// The same with m = factor I, all rows up to `end`.
+// `count` columns from `to` on get `factor` times those from `from` on, in the rows from `first` (a
+// multiple of four) on.
 template <typename Derived>
-void add_columns(Eigen::MatrixBase<Derived>& p, int to, int from, typename Derived::Scalar factor,
-                 int end) {
+void add_columns(Eigen::MatrixBase<Derived>& p, int to, int from, int count,
+                 typename Derived::Scalar factor, int first) {
   using Scalar = typename Derived::Scalar;
-  for (int k = 0; k < 3; ++k) {
+  for (int k = 0; k < count; ++k) {
     Scalar* target = &p.derived().coeffRef(0, to + k);
     const Scalar* source = &p.derived().coeffRef(0, from + k);
-    for (int i = 0; i < end; i += 4) {
+    for (int i = first; i < Derived::RowsAtCompileTime; i += 4) {
       Packet<Scalar> x(target + i);
       x.add(factor, Packet<Scalar>(source + i));
       x.store(target + i);
@@ -227,34 +203,6 @@ void add_product(Columns<Scalar, P> p, Columns<const Scalar, A> a, Columns<const
   }
   for (; i < end; i += 4) {
     detail::add_product_tile<1, Subtract>(p.from(i), a.from(i), b, count);
-  }
-}
-
-// `Packets` packets of rows of P, those from columns 0 to `end`: P <- P + A B' with three columns
-// of A, which stay in registers, and of B.
-template <int Packets, typename Scalar, int P, int A, int B>
-void add_rows(Columns<Scalar, P> p, Columns<const Scalar, A> a, Columns<const Scalar, B> b,
-              int end) {
-  Packet<Scalar> x[Packets], y[Packets], z[Packets];
-#pragma GCC unroll 3
-  for (int k = 0; k < Packets; ++k) {
-    x[k] = Packet<Scalar>(a[0] + 4 * k);
-    y[k] = Packet<Scalar>(a[1] + 4 * k);
-    z[k] = Packet<Scalar>(a[2] + 4 * k);
-  }
-  const Scalar *bx = b[0], *by = b[1], *bz = b[2];
-  for (int j = 0; j < end; ++j, p.first += P) {
-    Packet<Scalar> rows[Packets];
-#pragma GCC unroll 3
-    for (int k = 0; k < Packets; ++k) rows[k] = Packet<Scalar>(p.first + 4 * k);
-#pragma GCC unroll 3
-    for (int k = 0; k < Packets; ++k) rows[k].add(bx[j], x[k]);
-#pragma GCC unroll 3
-    for (int k = 0; k < Packets; ++k) rows[k].add(by[j], y[k]);
-#pragma GCC unroll 3
-    for (int k = 0; k < Packets; ++k) rows[k].add(bz[j], z[k]);
-#pragma GCC unroll 3
-    for (int k = 0; k < Packets; ++k) rows[k].store(p.first + 4 * k);
   }
 }
 

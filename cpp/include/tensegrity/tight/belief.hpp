@@ -20,18 +20,13 @@
 namespace tensegrity::tight {
 
 template <typename Scalar_>
-struct Belief {
+struct Belief : inekf::BodyError {
   using Scalar = Scalar_;
   using V3 = Vector3<Scalar>;
   using M3 = Matrix3<Scalar>;
 
-  // Where each block of the error starts.
-  static constexpr int kRotation = 0;
-  static constexpr int kVelocity = 3;
-  static constexpr int kPosition = 6;
-  static constexpr int kGyroBias = 9;
-  static constexpr int kAccelBias = 12;
-  static constexpr int kEndcaps = 15;
+  // Where the error's further blocks start.
+  static constexpr int kEndcaps = kBodyEnd;
   static constexpr int kRates = 27;
   static constexpr int kOffsets = 39;
   static constexpr int kGround = 48;

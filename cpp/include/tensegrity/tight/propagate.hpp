@@ -31,24 +31,18 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   x.template middleCols<4>(2) += dt * x.template middleCols<4>(6);
   belief.rate = motion.gyro;
 
-  constexpr int kGroupEnd = padded(B::kOffsets);
-  inekf::Transition<Scalar, B::Dim> transition(body, noise.gyro, noise.accel, kGroupEnd);
-
-  // ---- P F': of the rows above the diagonal those that are read below
+  // Endcaps by their velocities: columns, and rows from the diagonal on.
   auto& p = belief.covariance;
-  for (int c = 2; c < B::kColumns; ++c) {
-    const int at = B::column_index(c);
-    if (at < B::kRates) add_columns(p, at, B::kRates + (at - B::kEndcaps), dt, B::Dim);
-    transition.set_group(at, body.column_by_gyro(Packet<Scalar>(x.col(c))));
-    transition.group_columns(p, at, B::Dim);
-  }
-  transition.body_columns(p, B::Dim);
-
-  // ---- F (P F'): rows from the diagonal on
+  add_columns(p, B::kEndcaps, B::kRates, 12, dt, packet_start(B::kEndcaps));
   for (int j = 0; j < B::kRates; ++j) {
     p.col(j).template segment<12>(B::kEndcaps) += dt * p.col(j).template segment<12>(B::kRates);
   }
-  transition.all_rows(p, packet_start(B::kEndcaps), B::kOffsets);
+  inekf::fall_and_move(p, gravity * dt, dt, B::Dim);
+  inekf::SensorErrors<Scalar, B::Dim> errors(body, noise.gyro, noise.accel);
+  for (int c = 2; c < B::kColumns; ++c) {
+    errors.set_group(B::column_index(c), body.column_by_gyro(Packet<Scalar>(x.col(c))));
+  }
+  errors.apply(p, B::kOffsets, B::Dim);
 
   // ---- walks of the step
   const auto walk = [&](int at, int size, Scalar std) {
