@@ -14,6 +14,7 @@
 
 #include "tensegrity/inekf/body_error.hpp"
 #include "tensegrity/inekf/column_covariance.hpp"
+#include "tensegrity/inekf/retraction.hpp"
 #include "tensegrity/math/so3.hpp"
 #include "tensegrity/math/symmetric.hpp"
 
@@ -75,14 +76,13 @@ struct Belief : BodyError {
 
   // X <- Exp(-xi) X, theta <- theta - zeta: takes an estimated error e out of the mean (T eq. 13).
   void retract(const ErrorVector& e) {
-    const Gamma<Scalar> gamma(-e.template segment<3>(kRotation));
-    const auto move = [&](auto&& column, int at) {
-      column = (gamma.g0 * column - gamma.g1 * e.template segment<3>(at)).eval();
-    };
-    move(velocity, kVelocity);
-    move(position, kPosition);
-    for (int slot = 0; slot < anchor_count; ++slot) move(anchors.col(slot), anchor_index(slot));
-    rotation = orthonormalized<Scalar>(gamma.g0 * rotation);
+    const Retraction<Scalar> group(&e[kRotation]);
+    group.move(rotation);
+    group.move(velocity, &e[kVelocity]);
+    group.move(position, &e[kPosition]);
+    for (int slot = 0; slot < anchor_count; ++slot) {
+      group.move(anchors.col(slot), &e[anchor_index(slot)]);
+    }
     gyro_bias -= e.template segment<3>(kGyroBias);
     accel_bias -= e.template segment<3>(kAccelBias);
     extra -= e.template segment<Extra>(kExtra);

@@ -33,7 +33,8 @@ void fall_and_move(P& covariance, typename P::Scalar fall, typename P::Scalar dt
   const Scalar half = fall * dt / 2;
   const Pack v_by_rx(0, 0, -fall, 0), v_by_ry(0, fall, 0, 0);
   const Pack p_by_rx(0, -half, 0, 0), p_by_ry(half, 0, 0, 0), p_by_v(dt, dt, dt, 0);
-  // Rows of p and of v in one column, by the rows of R and v that they see.
+  // Rows of p and of v in one column, by the rows of R and v that they see. The fourth number of
+  // `v` does not matter.
   const auto move = [&](Scalar* column, Scalar rx, Scalar ry, const Pack& v) {
     Pack x(column + kP);
     x = x + p_by_v * v;
@@ -64,8 +65,8 @@ void fall_and_move(P& covariance, typename P::Scalar fall, typename P::Scalar dt
   // the diagonal has its mirror image below.
   const Pack rx_v(rx + kV), ry_v(ry + kV);
   move(vx, rx[9], ry[9], Pack(vx + 9));
-  move(vy, rx[10], ry[10], {vx[10], vy[10], vy[11], Scalar(0)});
-  move(vz, rx[11], ry[11], {vx[11], vy[11], vz[11], Scalar(0)});
+  move(vy, rx[10], ry[10], {vx[10], vy[10], vy[11], vy[11]});
+  move(vz, rx[11], ry[11], {vx[11], vy[11], vz[11], vz[11]});
   const Scalar rx_ry = rx[7], rx_rz = rx[8], ry_rz = ry[8];
   for (int j = 0; j < E::kVelocity; ++j) {
     Scalar* column = p[j];
@@ -75,7 +76,7 @@ void fall_and_move(P& covariance, typename P::Scalar fall, typename P::Scalar dt
     fall_in(column, x, y);
   }
   // Rows of p in its columns, by what p now has in those of R and v.
-  for (int k = kP; k < kP + 3; ++k) move(p[k], rx[k], ry[k], {vx[k], vy[k], vz[k], Scalar(0)});
+  for (int k = kP; k < kP + 3; ++k) move(p[k], rx[k], ry[k], {vx[k], vy[k], vz[k], vz[k]});
   // Columns of v in the rows of p and v, and the rows of v in them.
   const Pack rx_p(rx + kP), ry_p(ry + kP);
   const auto add = [](Scalar* to, Scalar factor, const Pack& x) {

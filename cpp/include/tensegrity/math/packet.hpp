@@ -188,6 +188,19 @@ class Packet {
     return {x.at(A), x.at(B), x.at(C), x.at(D)};
   }
 
+  // The first three numbers of x, and y's number in `Row`.
+  template <int Row>
+  static Packet with_fourth(const Packet& x, const Packet& y) {
+#if __has_builtin(__builtin_shufflevector)
+    if constexpr (kRegisters == 1) {
+      Packet out;
+      out.part_[0] = __builtin_shufflevector(x.part_[0], y.part_[0], 0, 1, 2, 4 + Row);
+      return out;
+    }
+#endif
+    return {x.at(0), x.at(1), x.at(2), y.at(Row)};
+  }
+
   // Columns of a block of four by four become its rows.
   static void transpose(Packet& x0, Packet& x1, Packet& x2, Packet& x3) {
 #if __has_builtin(__builtin_shufflevector)

@@ -99,8 +99,8 @@ class Sum {
 };
 
 // P h for an h of `blocks` blocks of three numbers, for the columns of P from at[b] on. From one
-// number of h to the next it is `Step`.
-template <int Step, int First = 0, typename Derived>
+// number of h to the next it is `Step`, from one block to the next `BlockStep`.
+template <int Step, int BlockStep, int First = 0, typename Derived>
 void multiply_blocks(const Eigen::MatrixBase<Derived>& p, const int* at,
                      const typename Derived::Scalar* h, int blocks, typename Derived::Scalar* out) {
   using Scalar = typename Derived::Scalar;
@@ -108,8 +108,8 @@ void multiply_blocks(const Eigen::MatrixBase<Derived>& p, const int* at,
   constexpr int kPackets = kStride / 4;
   constexpr int kHere = std::min(packets_at_once<Scalar>(kPackets), kPackets - First);
   Packet<Scalar> sum[kHere];
-  const Scalar* factor = h;
   for (int b = 0; b < blocks; ++b) {
+    const Scalar* factor = h + b * BlockStep;
     const Scalar* column = &p.derived().coeffRef(4 * First, at[b]);
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i, factor += Step, column += kStride) {
@@ -120,7 +120,7 @@ void multiply_blocks(const Eigen::MatrixBase<Derived>& p, const int* at,
 #pragma GCC unroll 13
   for (int k = 0; k < kHere; ++k) sum[k].store(out + 4 * (First + k));
   if constexpr (First + kHere < kPackets) {
-    multiply_blocks<Step, First + kHere>(p, at, h, blocks, out);
+    multiply_blocks<Step, BlockStep, First + kHere>(p, at, h, blocks, out);
   }
 }
 

@@ -14,6 +14,7 @@
 #pragma once
 
 #include "tensegrity/inekf/column_covariance.hpp"
+#include "tensegrity/inekf/retraction.hpp"
 #include "tensegrity/math/so3.hpp"
 #include "tensegrity/robot/prism.hpp"
 
@@ -95,24 +96,9 @@ struct Belief : inekf::BodyError {
 
   // X <- Exp(-xi) X, theta <- theta - zeta: takes an estimated error out of the mean.
   void retract(const ErrorVector& e) {
-    const Gamma<Scalar> gamma(-e.template segment<3>(kRotation));
-    // The fourth number of a column does not matter.
-    const auto column_of = [](const M3& m, int k) {
-      return Packet<Scalar>(m(0, k), m(1, k), m(2, k), m(2, k));
-    };
-    const auto packets = [&](const M3& m) {
-      return Block<Scalar>{column_of(m, 0), column_of(m, 1), column_of(m, 2)};
-    };
-    const Block<Scalar> g0 = packets(gamma.g0), g1 = packets(gamma.g1);
-    for (int c = 0; c < kColumns; ++c) {
-      const Scalar* error = &e[column_index(c)];
-      auto column = columns.col(c);
-      Packet<Scalar> moved = column[0] * g0[0], back = error[0] * g1[0];
-      moved.add(column[1], g0[1]), back.add(error[1], g1[1]);
-      moved.add(column[2], g0[2]), back.add(error[2], g1[2]);
-      (moved - back).store_vector(column);
-    }
-    rotation = orthonormalized<Scalar>(gamma.g0 * rotation);
+    const inekf::Retraction<Scalar> group(&e[kRotation]);
+    group.move(rotation);
+    for (int c = 0; c < kColumns; ++c) group.move(columns.col(c), &e[column_index(c)]);
     gyro_bias -= e.template segment<3>(kGyroBias);
     rate += e.template segment<3>(kGyroBias);
     accel_bias -= e.template segment<3>(kAccelBias);

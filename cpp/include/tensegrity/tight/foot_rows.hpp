@@ -1,5 +1,5 @@
-// The four rows of H of a foot (feet.hpp): those of its slip share columns, and the products of all
-// four with a vector are one packet.
+// The four rows of H of a foot (feet.hpp): those of its slip share columns, and their products with
+// a vector are one packet.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ class FootRows {
   using P = Packet<Scalar>;
   static constexpr int kBlocks = 3;  // of the slip, and of the height
 
-  FootRows() { set_zero(h_[0], h_[3 * kBlocks]); }
+  FootRows() { set_zero(slip_[0], slip_[3 * kBlocks]); }
 
   // Columns at .. at + 2 of the slip's rows: vectors of three. Blocks in which the one across the
   // ground is zero come last.
@@ -24,48 +24,59 @@ class FootRows {
   void add_slip(int at, P first, P second, P across) {
     P fourth;
     P::transpose(first, second, across, fourth);
-    at_[std::size_t(slip_)] = at;
-    first.store(h_[3 * slip_]);
-    second.store(h_[3 * slip_ + 1]);
-    across.store(h_[3 * slip_ + 2]);
-    ++slip_;
+    slip_at_[std::size_t(blocks_)] = at;
+    first.store(slip_[3 * blocks_]);
+    second.store(slip_[3 * blocks_ + 1]);
+    across.store(slip_[3 * blocks_ + 2]);
+    ++blocks_;
   }
-  // All of them are set. The fourth number of `h` does not matter.
-  void set_height(int block, int at, const P& h) {
-    at_[std::size_t(kBlocks + block)] = at;
-    for (int i = 0; i < 3; ++i) P(0, 0, 0, h.at(i)).store(h_[3 * (kBlocks + block) + i]);
+  // All of them are set.
+  void set_height(int block, int at, P h) {
+    height_at_[std::size_t(block)] = at;
+    h.clear_fourth();
+    h.store(height_[block]);
   }
   void limit_across(int blocks) { across_ = blocks; }
 
   // P H', of one row.
   void cross(int row, const typename Belief<Scalar>::Covariance& p, Scalar* out) const {
-    const int first = row < 3 ? 0 : kBlocks;
-    const int blocks = row < 2 ? slip_ : row == 2 ? across_ : kBlocks;
-    multiply_blocks<4>(p, at_.data() + first, &h_[3 * first][row], blocks, out);
-  }
-  // H x of `Count` vectors x, `stride` apart.
-  template <int Count>
-  void times(const Scalar* x, P* out, int stride = 0) const {
-    P a[Count], b[Count], c[Count];  // one for each axis: the chains of additions are short
-#pragma GCC unroll 6
-    for (int k = 0; k < 2 * kBlocks; ++k) {
-      const Scalar* at = x + at_[std::size_t(k)];
-      const P ha(h_[3 * k]), hb(h_[3 * k + 1]), hc(h_[3 * k + 2]);
-#pragma GCC unroll 4
-      for (int j = 0; j < Count; ++j) a[j].add(at[j * stride], ha);
-#pragma GCC unroll 4
-      for (int j = 0; j < Count; ++j) b[j].add(at[j * stride + 1], hb);
-#pragma GCC unroll 4
-      for (int j = 0; j < Count; ++j) c[j].add(at[j * stride + 2], hc);
+    if (row == 3) {
+      multiply_blocks<1, 4>(p, height_at_.data(), height_[0], kBlocks, out);
+    } else {
+      multiply_blocks<4, 12>(p, slip_at_.data(), &slip_[0][row], row < 2 ? blocks_ : across_, out);
     }
+  }
+  // H x of four vectors x, `stride` apart.
+  void times(const Scalar* x, P* out, int stride) const {
+    P slip[2][4], height[4];  // two sums of each: the chains of additions are short
+#pragma GCC unroll 3
+    for (int b = 0; b < kBlocks; ++b) {
+      const P h(height_[b]);
 #pragma GCC unroll 4
-    for (int j = 0; j < Count; ++j) out[j] = a[j] + b[j] + c[j];
+      for (int j = 0; j < 4; ++j) {
+        height[j] = height[j] + h * P(x + height_at_[std::size_t(b)] + j * stride);
+      }
+      const Scalar* at = x + slip_at_[std::size_t(b)];
+#pragma GCC unroll 3
+      for (int i = 0; i < 3; ++i) {
+        const P column(slip_[3 * b + i]);
+#pragma GCC unroll 4
+        for (int j = 0; j < 4; ++j) slip[(b + i) % 2][j].add(at[j * stride + i], column);
+      }
+    }
+    P::transpose(height[0], height[1], height[2], height[3]);
+    const P heights = height[0] + height[1] + height[2];
+    out[0] = P::template with_fourth<0>(slip[0][0] + slip[1][0], heights);
+    out[1] = P::template with_fourth<1>(slip[0][1] + slip[1][1], heights);
+    out[2] = P::template with_fourth<2>(slip[0][2] + slip[1][2], heights);
+    out[3] = P::template with_fourth<3>(slip[0][3] + slip[1][3], heights);
   }
 
  private:
-  alignas(4 * sizeof(Scalar)) Scalar h_[6 * kBlocks][4];  // by column, then by row
-  std::array<int, 2 * kBlocks> at_{};
-  int slip_ = 0, across_ = 1;
+  alignas(4 * sizeof(Scalar)) Scalar slip_[3 * kBlocks][4];  // by column, then by row
+  alignas(4 * sizeof(Scalar)) Scalar height_[kBlocks][4];
+  std::array<int, kBlocks> slip_at_{}, height_at_{};
+  int blocks_ = 0, across_ = 1;
 };
 
 }  // namespace tensegrity::tight

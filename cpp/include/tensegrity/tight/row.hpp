@@ -32,7 +32,7 @@ class Row {
 
   // P H'
   void cross(const typename Belief<Scalar>::Covariance& p, Scalar* out) const {
-    multiply_blocks<1>(p, at_.data(), h_[0].data(), blocks_, out);
+    multiply_blocks<1, 3>(p, at_.data(), h_[0].data(), blocks_, out);
     if (single_at_ < 0) return;
     for (int i = 0; i < Belief<Scalar>::Dim; i += 4) {
       Packet<Scalar> sum(out + i);

@@ -78,11 +78,11 @@ class SequentialUpdate {
     // Rows that are known early come first: those of the slip wait for its direction.
     for (int k = 3; k >= 0; --k) rows.cross(k, belief_.covariance, cross(own + k));
     P seen[kCapacity];  // columns of H P H' in these rows
-    for (int k = 0; k < own + 4; k += 4) rows.template times<4>(cross(k), &seen[k], B::Dim);
+    for (int k = 0; k < own + 4; k += 4) rows.times(cross(k), &seen[k], B::Dim);
     if (taken_) {
-      P x;
-      rows.template times<1>(&error_[0], &x);
-      residual = residual - x;
+      P x[4];  // all of them of the same vector
+      rows.times(&error_[0], x, 0);
+      residual = residual - x[0];
     }
     // With loops of known length the elimination stays in registers.
     static_assert(kCapacity == 12);

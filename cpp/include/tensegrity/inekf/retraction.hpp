@@ -1,0 +1,60 @@
+// Takes an estimated error out of the group part of a mean: X <- Exp(-xi) X (T eq. 13).
+#pragma once
+
+#include "tensegrity/math/so3.hpp"
+
+namespace tensegrity::inekf {
+
+// Column by column: R <- Gamma_0 R, x <- Gamma_0 x - Gamma_1 xi_x, with Gamma_m of -xi_R.
+template <typename Scalar>
+class Retraction {
+ public:
+  using P = Packet<Scalar>;
+
+  // `xi_r`: error of the rotation, three numbers.
+  explicit Retraction(const Scalar* xi_r) {
+    const Vector3<Scalar> x(-xi_r[0], -xi_r[1], -xi_r[2]);
+    const RotationSeries<Scalar> c(x.squaredNorm());
+    // Column k of Gamma_m: c_m e_k + c_{m+1} x cross e_k + c_{m+2} x_k x.
+    const P axis(x);
+    const Block<Scalar> unit = {P(1, 0, 0, 0), P(0, 1, 0, 0), P(0, 0, 1, 0)};
+    for (int k = 0; k < 3; ++k) {
+      const std::size_t column = std::size_t(k);
+      const P across = P::cross(axis, unit[column]), along = x[k] * axis;
+      turn_[column] = c.c0 * unit[column];
+      turn_[column].add(c.c1, across), turn_[column].add(c.c2, along);
+      shift_[column] = c.c1 * unit[column];
+      shift_[column].add(c.c2, across), shift_[column].add(c.c3, along);
+    }
+  }
+
+  void move(Matrix3<Scalar>& rotation) const {
+    const Block<Scalar> moved = orthonormalized(
+        Block<Scalar>{turned(rotation.col(0)), turned(rotation.col(1)), turned(rotation.col(2))});
+    for (int k = 0; k < 3; ++k) {
+      auto column = rotation.col(k);
+      moved[std::size_t(k)].store_vector(column);
+    }
+  }
+  // A column x of the group and its error.
+  template <typename Column>
+  void move(Column&& column, const Scalar* error) const {
+    P back = error[0] * shift_[0];
+    back.add(error[1], shift_[1]);
+    back.add(error[2], shift_[2]);
+    (turned(column) - back).store_vector(column);
+  }
+
+ private:
+  template <typename Column>
+  P turned(const Column& x) const {
+    P sum = x[0] * turn_[0];
+    sum.add(x[1], turn_[1]);
+    sum.add(x[2], turn_[2]);
+    return sum;
+  }
+
+  Block<Scalar> turn_, shift_;  // Gamma_0, Gamma_1
+};
+
+}  // namespace tensegrity::inekf
