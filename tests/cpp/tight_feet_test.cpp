@@ -24,10 +24,11 @@ constexpr double kTolerance = 20 * kDerivativeError;  // norms of vectors of som
 // The row `k` of them.
 VectorXd dense(const FootRows<double>& rows, int k) {
   VectorXd h(B::Dim);
-  for (int i = 0; i < B::Dim; ++i) {
-    Packet<double> column;
-    rows.times<1>(VectorXd(VectorXd::Unit(B::Dim, i)).data(), &column);
-    h[i] = column.at(k);
+  const B::Covariance unit = B::Covariance::Identity();
+  for (int i = 0; i < B::Dim; i += 4) {
+    Packet<double> columns[4];
+    rows.times(&unit(0, i), columns, B::Dim);
+    for (int c = 0; c < 4; ++c) h[i + c] = columns[c].at(k);
   }
   return h;
 }

@@ -16,7 +16,7 @@ class FootRows {
   using P = Packet<Scalar>;
   static constexpr int kBlocks = 3;  // of the slip, and of the height
 
-  FootRows() { set_zero(slip_[0], slip_[3 * kBlocks]); }
+  FootRows() { set_zero(slip_.data(), slip_.data() + slip_.size()); }
 
   // Columns at .. at + 2 of the slip's rows: vectors of three. Blocks in which the one across the
   // ground is zero come last.
@@ -25,9 +25,9 @@ class FootRows {
     P fourth;
     P::transpose(first, second, across, fourth);
     slip_at_[std::size_t(blocks_)] = at;
-    first.store(slip_[3 * blocks_]);
-    second.store(slip_[3 * blocks_ + 1]);
-    across.store(slip_[3 * blocks_ + 2]);
+    first.store(&slip_(0, 3 * blocks_));
+    second.store(&slip_(0, 3 * blocks_ + 1));
+    across.store(&slip_(0, 3 * blocks_ + 2));
     ++blocks_;
   }
   // All of them are set.
@@ -43,7 +43,7 @@ class FootRows {
     if (row == 3) {
       multiply_blocks<1, 4>(p, height_at_.data(), height_[0], kBlocks, out);
     } else {
-      multiply_blocks<4, 12>(p, slip_at_.data(), &slip_[0][row], row < 2 ? blocks_ : across_, out);
+      multiply_blocks<4, 12>(p, slip_at_.data(), &slip_(row, 0), row < 2 ? blocks_ : across_, out);
     }
   }
   // H x of four vectors x, `stride` apart.
@@ -59,7 +59,7 @@ class FootRows {
       const Scalar* at = x + slip_at_[std::size_t(b)];
 #pragma GCC unroll 3
       for (int i = 0; i < 3; ++i) {
-        const P column(slip_[3 * b + i]);
+        const P column(&slip_(0, 3 * b + i));
 #pragma GCC unroll 4
         for (int j = 0; j < 4; ++j) slip[(b + i) % 2][j].add(at[j * stride + i], column);
       }
@@ -73,7 +73,7 @@ class FootRows {
   }
 
  private:
-  alignas(4 * sizeof(Scalar)) Scalar slip_[3 * kBlocks][4];  // by column, then by row
+  Matrix<Scalar, 4, 3 * kBlocks> slip_;
   alignas(4 * sizeof(Scalar)) Scalar height_[kBlocks][4];
   std::array<int, kBlocks> slip_at_{}, height_at_{};
   int blocks_ = 0, across_ = 1;
