@@ -167,7 +167,7 @@ class FilterNoise:
         ...
 class InvariantFilter:
     """
-    Mean on SE_{2+N}(3) x R^7 (biases and the spin angle) and covariance of the right-invariant error (rotation, velocity, position, gyro bias, accelerometer bias, spin, contacts).
+    Mean on SE_{2+N}(3) x R^7 (biases and the spin angle) and covariance of the right-invariant error (gyro bias, accelerometer bias, rotation, velocity, position, spin, contacts).
     """
     def __init__(self) -> None:
         ...

@@ -15,7 +15,7 @@
 
 namespace tensegrity {
 
-// `Rows`: of P, a multiple of four.
+// `Rows`: of P, a multiple of four, the last of them after those of x.
 template <typename Scalar, int Rows>
 class Shear {
  public:
