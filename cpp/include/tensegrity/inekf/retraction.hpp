@@ -17,7 +17,8 @@ class Retraction {
     const RotationSeries<Scalar> c(x.squaredNorm());
     // Column k of Gamma_m: c_m e_k + c_{m+1} x cross e_k + c_{m+2} x_k x.
     const P axis(x);
-    const Block<Scalar> unit = {P(1, 0, 0, 0), P(0, 1, 0, 0), P(0, 0, 1, 0)};
+    const Block<Scalar> unit = {P::constant(1, 0, 0, 0), P::constant(0, 1, 0, 0),
+                                P::constant(0, 0, 1, 0)};
     for (int k = 0; k < 3; ++k) {
       const std::size_t column = std::size_t(k);
       const P across = P::cross(axis, unit[column]), along = x[k] * axis;

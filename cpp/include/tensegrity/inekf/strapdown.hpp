@@ -92,7 +92,7 @@ Strapdown<Scalar> integrate(Matrix3<Scalar>& rotation, Velocity&& velocity, Posi
     s.position_by_accel[k] = Scalar(-1) * r_g2[k];
     next[k] = combine(c.c0, r[k], c.c1, once, x[j], y2);
   }
-  const P g(Scalar(0), Scalar(0), -gravity, Scalar(0));
+  const P g = -gravity * P::constant(0, 0, 1, 0);
   const P start_velocity(velocity);
   const P moved = P(position) + (dt * start_velocity + (turned(r_g2, a) + dt2 / 2 * g));
   const P faster = start_velocity + (turned(s.int_r, a) + dt * g);

@@ -31,22 +31,24 @@ void fall_and_move(P& covariance, typename P::Scalar fall, typename P::Scalar dt
   static_assert(kV % 4 == 0 && kP % 4 == 0);
   // g x xi_R = |g| (xi_Ry, -xi_Rx, 0); the fall's effect on p is `half` of that on v.
   const Scalar half = fall * dt / 2;
-  const Pack v_by_rx(0, 0, -fall, 0), v_by_ry(0, fall, 0, 0);
-  const Pack p_by_rx(0, -half, 0, 0), p_by_ry(half, 0, 0, 0), p_by_v(dt, dt, dt, 0);
+  const Pack x = Pack::constant(1, 0, 0, 0), y = Pack::constant(0, 1, 0, 0),
+             z = Pack::constant(0, 0, 1, 0);
+  const Pack v_by_rx = -fall * z, v_by_ry = fall * y;  // after a row of R
+  const Pack p_by_rx = -half * y, p_by_ry = half * x;
+  const Pack p_by_v = dt * Pack::constant(1, 1, 1, 0);
   // Rows of p and of v in one column, by the rows of R and v that they see. The fourth number of
   // `v` does not matter.
   const auto move = [&](Scalar* column, Scalar rx, Scalar ry, const Pack& v) {
-    Pack x(column + kP);
-    x = x + p_by_v * v;
-    x.add(rx, p_by_rx);
-    x.add(ry, p_by_ry);
-    x.store(column + kP);
+    Pack sum = Pack(column + kP) + p_by_v * v;
+    sum.add(rx, p_by_rx);
+    sum.add(ry, p_by_ry);
+    sum.store(column + kP);
   };
   const auto fall_in = [&](Scalar* column, Scalar rx, Scalar ry) {
-    Pack x(column + kV);
-    x.add(rx, v_by_rx);
-    x.add(ry, v_by_ry);
-    x.store(column + kV);
+    Pack sum(column + kV);
+    sum.add(rx, v_by_rx);
+    sum.add(ry, v_by_ry);
+    sum.store(column + kV);
   };
 
   // Columns of p, and after the rows of p those of v.
@@ -70,10 +72,10 @@ void fall_and_move(P& covariance, typename P::Scalar fall, typename P::Scalar dt
   const Scalar rx_ry = rx[7], rx_rz = rx[8], ry_rz = ry[8];
   for (int j = 0; j < E::kVelocity; ++j) {
     Scalar* column = p[j];
-    const Scalar x = j == 7 ? rx_ry : j == 8 ? rx_rz : column[6];
-    const Scalar y = j == 8 ? ry_rz : column[7];
-    move(column, x, y, Pack(column + 9));
-    fall_in(column, x, y);
+    const Scalar by_x = j == 7 ? rx_ry : j == 8 ? rx_rz : column[6];
+    const Scalar by_y = j == 8 ? ry_rz : column[7];
+    move(column, by_x, by_y, Pack(column + 9));
+    fall_in(column, by_x, by_y);
   }
   // Rows of p in its columns, by what p now has in those of R and v.
   for (int k = kP; k < kP + 3; ++k) move(p[k], rx[k], ry[k], {vx[k], vy[k], vz[k], vz[k]});
