@@ -163,10 +163,12 @@ class Packet {
     return c.at(0) + c.at(1) + c.at(2);
   }
 
-  // As a blend: built with a zero GCC moves a register in a way that Valgrind 3.19 does not know.
+  // As a blend of what is in a register: built with a zero GCC moves a register in a way that
+  // Valgrind 3.19 does not know.
   void clear_fourth() {
 #if __has_builtin(__builtin_shufflevector)
     if constexpr (kRegisters == 1) {
+      hold();
       part_[0] = __builtin_shufflevector(part_[0], Register{}, 0, 1, 2, 4);
       return;
     }
