@@ -130,7 +130,8 @@ TEST_CASE("base rod: the same as in the loosely coupled filter") {
   loose.position = start.position();
   loose.gyro_bias = start.gyro_bias;
   loose.accel_bias = start.accel_bias;
-  loose.covariance.topLeftCorner<B::kBodyEnd, B::kBodyEnd>() = start.covariance.topLeftCorner<B::kBodyEnd, B::kBodyEnd>();
+  loose.covariance.topLeftCorner<B::kBodyEnd, B::kBodyEnd>() =
+      start.covariance.topLeftCorner<B::kBodyEnd, B::kBodyEnd>();
   for (int k = 0; k < 20; ++k) {
     propagate(tight, imu, dt, kGravity, noise);
     tensegrity::inekf::propagate(loose, imu, dt, kGravity,
