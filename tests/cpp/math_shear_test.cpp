@@ -5,16 +5,11 @@
 
 #include <limits>
 
-#include "tensegrity/math/so3.hpp"
-
 namespace {
 
-using tensegrity::Block;
 using tensegrity::Matrix;
-using tensegrity::Packet;
 using tensegrity::padded;
 using tensegrity::Shear;
-using tensegrity::Vector3;
 
 // P of `size` states, of which `begin` to `end` see three errors from `source` on.
 template <typename Scalar>
@@ -31,9 +26,7 @@ void check(int source, int begin, int end, int size, Scalar tolerance) {
   for (int at = begin; at < end; at += 3) {
     const Dense m = Dense::Random(3, 3);
     b.middleRows(at, 3) = m;
-    shear.set(at, Block<Scalar>{Packet<Scalar>(Vector3<Scalar>(m.col(0))),
-                                Packet<Scalar>(Vector3<Scalar>(m.col(1))),
-                                Packet<Scalar>(Vector3<Scalar>(m.col(2)))});
+    shear.set(at, tensegrity::to_block(Matrix<Scalar, 3>(m)));
   }
   Dense f = Dense::Identity(size, size);
   f.middleCols(source, 3) += b;

@@ -94,7 +94,7 @@ TEST_CASE("Gamma_2 is the integral of s Exp(s x)") {
 TEST_CASE("orthonormalized removes rounding drift") {
   tensegrity::Matrix3<double> r = SO3<double>::Exp({0.3, 0.2, -0.9}).matrix();
   r += 1e-6 * tensegrity::Matrix3<double>::Ones();
-  r = tensegrity::orthonormalized(r);
+  tensegrity::store_block(tensegrity::orthonormalized(tensegrity::to_block(r)), r);
   CHECK((r * r.transpose() - tensegrity::Matrix3<double>::Identity()).norm() < 1e-10);
 }
 

@@ -42,8 +42,7 @@ TENSEGRITY_FLATTEN void propagate(B& belief, const ImuSample<Scalar>& imu, Scala
 
   // Contact points: d+ = d + r turn x e_z, and the touching point d - r e_z is what turns with R,
   //   xi_d+ = xi_d + r turn x (e_z x xi_R) - int (d - r e_z) x R zeta_g
-  using Covariance = typename B::Covariance;
-  constexpr int kRows = Covariance::RowsAtCompileTime;
+  constexpr int kRows = B::Covariance::RowsAtCompileTime;
   const int anchors = belief.anchor_count;
   const V3 up = V3::UnitZ();
   if (rolling.radius > 0) {
@@ -51,9 +50,7 @@ TENSEGRITY_FLATTEN void propagate(B& belief, const ImuSample<Scalar>& imu, Scala
     const V3 turn = belief.rotation * motion.gyro * dt;
     belief.anchors.leftCols(anchors).colwise() += rolling.radius * turn.cross(up);
     const M3 by_rotation = rolling.radius * hat(turn) * hat(up);
-    const Block<Scalar> by = {Packet<Scalar>(by_rotation.col(0)),
-                              Packet<Scalar>(by_rotation.col(1)),
-                              Packet<Scalar>(by_rotation.col(2))};
+    const Block<Scalar> by = to_block(by_rotation);
     Shear<Scalar, kRows> roll(B::kRotation);
     roll.clear(packet_start(B::kAnchors), rows);
     for (int i = 0; i < anchors; ++i) roll.set(B::anchor_index(i), by);

@@ -30,12 +30,9 @@ class Retraction {
   }
 
   void move(Matrix3<Scalar>& rotation) const {
-    const Block<Scalar> moved = orthonormalized(
-        Block<Scalar>{turned(rotation.col(0)), turned(rotation.col(1)), turned(rotation.col(2))});
-    for (int k = 0; k < 3; ++k) {
-      auto column = rotation.col(k);
-      moved[std::size_t(k)].store_vector(column);
-    }
+    store_block(orthonormalized(Block<Scalar>{turned(rotation.col(0)), turned(rotation.col(1)),
+                                              turned(rotation.col(2))}),
+                rotation);
   }
   // A column x of the group and its error.
   template <typename Column>

@@ -6,8 +6,6 @@
 // like a bias of this step alone.
 #pragma once
 
-#include <array>
-
 #include "tensegrity/math/packet.hpp"
 #include "tensegrity/math/so3.hpp"
 
@@ -60,7 +58,7 @@ Strapdown<Scalar> integrate(Matrix3<Scalar>& rotation, Velocity&& velocity, Posi
   const auto slopes = c.slopes();
   const Scalar dt2 = dt * dt, dt3 = dt2 * dt;
 
-  const Block<Scalar> r = {P(rotation.col(0)), P(rotation.col(1)), P(rotation.col(2))};
+  const Block<Scalar> r = to_block(rotation);
   const auto turned = [&](const Block<Scalar>& m, const V3& v) {
     P sum = v[0] * m[0];
     sum.add(v[1], m[1]);
@@ -118,11 +116,7 @@ Strapdown<Scalar> integrate(Matrix3<Scalar>& rotation, Velocity&& velocity, Posi
   };
   s.velocity_by_gyro = by_gyro(faster, dt2, c.c2, c.c3, slopes.c2, slopes.c3);
   s.position_by_gyro = by_gyro(moved, dt3, c.c3, c.c4, slopes.c3, slopes.c4);
-  next = orthonormalized(next);
-  for (int j = 0; j < 3; ++j) {
-    auto column = rotation.col(j);
-    next[std::size_t(j)].store_vector(column);
-  }
+  store_block(orthonormalized(next), rotation);
   return s;
 }
 

@@ -4,9 +4,11 @@
 // Biases move all that comes after them, the rotation v and p, the velocity p: in this order F is
 // lower triangular by blocks, and its parts, one after the other, are shears that need no more of P
 // than its lower triangle (shear.hpp):
-//   the body falls and moves,    xi_v+ = xi_v + g x xi_R dt, xi_p+ = xi_p + dt xi_v + g x xi_R
-//   dt^2/2 the accelerometer's error,   seen by xi_v and xi_p, the gyro's,                  seen by
-//   the whole group.
+//   the body falls and moves:
+//     xi_v+ = xi_v + g x xi_R dt
+//     xi_p+ = xi_p + dt xi_v + g x xi_R dt^2/2
+//   the accelerometer's error reaches xi_v and xi_p
+//   the gyro's reaches the whole group
 // The noise of a sample is one more error of its biases.
 #pragma once
 
@@ -100,7 +102,7 @@ class SensorErrors {
   // `gyro_std` [rad/s] and `accel_std` [m/s^2]: of the sample.
   SensorErrors(const Strapdown<Scalar>& body, Scalar gyro_std, Scalar accel_std)
       : gyro_(E::kGyroBias, gyro_std * gyro_std), accel_(E::kAccelBias, accel_std * accel_std) {
-    // By whole packets: zero, v.
+    // By whole packets of rows: (b_a, R), (R, v) and p; of the accelerometer (R, v) and p.
     for (int k = 0; k < 3; ++k) {
       const std::size_t column = std::size_t(k);
       const Packet<Scalar> int_r = Scalar(-1) * body.int_r[column];

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 
 // Before a function that runs all the time: it takes in all that it calls, so that what these hand
 // on stays in registers. Not where code has to be small, as where there is no SIMD.
@@ -238,6 +239,22 @@ class Packet {
   using Register = typename InMemory::Type;
   Register part_[kRegisters] = {};
 };
+
+// A matrix of three by three, a packet a column: products stay in registers.
+template <typename Scalar>
+using Block = std::array<Packet<Scalar>, 3>;
+
+template <typename Derived, typename Scalar = typename Derived::Scalar>
+Block<Scalar> to_block(const Eigen::MatrixBase<Derived>& m) {
+  return {Packet<Scalar>(m.col(0)), Packet<Scalar>(m.col(1)), Packet<Scalar>(m.col(2))};
+}
+template <typename Scalar>
+void store_block(const Block<Scalar>& block, Eigen::Matrix<Scalar, 3, 3>& m) {
+  for (int k = 0; k < 3; ++k) {
+    auto column = m.col(k);
+    block[std::size_t(k)].store_vector(column);
+  }
+}
 
 // Zeros in the packets from `rows` to `end`. GCC would call memset for them, which takes longer for
 // arrays as short as these.

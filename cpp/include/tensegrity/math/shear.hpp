@@ -8,7 +8,6 @@
 // and x count as x without rows in B.
 #pragma once
 
-#include <array>
 #include <type_traits>
 
 #include "tensegrity/math/symmetric.hpp"
@@ -25,7 +24,7 @@ class Shear {
   // Column k of B. Before `apply` all packets that it takes have to be set.
   Scalar* column(int k) { return by_[k]; }
   // Rows at .. at + 2 of B, and zeros in the row after them. By ascending `at`.
-  void set(int at, const std::array<Packet<Scalar>, 3>& m) {
+  void set(int at, const Block<Scalar>& m) {
     for (int k = 0; k < 3; ++k) m[std::size_t(k)].store(by_[k] + at);
   }
   void clear(int first, int end) {

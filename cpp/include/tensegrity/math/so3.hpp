@@ -4,7 +4,6 @@
 // operator*, and the left Jacobian J_l with Exp(x + J_l(x)^-1 dx) ~ Exp(dx) Exp(x).
 #pragma once
 
-#include <array>
 #include <cmath>
 
 #include "tensegrity/math/packet.hpp"
@@ -106,10 +105,6 @@ struct Gamma {
   }
 };
 
-// A matrix of three by three, a packet a column: products stay in registers.
-template <typename Scalar>
-using Block = std::array<Packet<Scalar>, 3>;
-
 template <typename Scalar>
 class SO3 {
  public:
@@ -182,16 +177,9 @@ Matrix3<Scalar> shortest_rotation(const Vector3<Scalar>& from, const Vector3<Sca
 // Pulls a matrix that has drifted by rounding back onto SO(3): one Newton step of the polar
 // decomposition, exact to second order in the drift.
 template <typename Scalar>
-Matrix3<Scalar> orthonormalized(const Matrix3<Scalar>& r) {
-  // (R + R^-T) / 2 with R^-T the cofactors over their determinant 1 + d, to second order 1 - d.
-  Matrix3<Scalar> cofactors;
-  for (int j = 0; j < 3; ++j) cofactors.col(j) = r.col((j + 1) % 3).cross(r.col((j + 2) % 3));
-  const Scalar inverse = 2 - r.col(0).dot(cofactors.col(0));
-  return (r + inverse * cofactors) / 2;
-}
-template <typename Scalar>
 Block<Scalar> orthonormalized(const Block<Scalar>& r) {
   using P = Packet<Scalar>;
+  // (R + R^-T) / 2 with R^-T the cofactors over their determinant 1 + d, to second order 1 - d.
   const Block<Scalar> cofactors = {P::cross(r[1], r[2]), P::cross(r[2], r[0]),
                                    P::cross(r[0], r[1])};
   const P volume = r[0] * cofactors[0];

@@ -13,6 +13,7 @@
 // body frame. Rods 23 and 45 keep their length by a measurement (members.hpp).
 #pragma once
 
+#include "tensegrity/inekf/body_error.hpp"
 #include "tensegrity/inekf/column_covariance.hpp"
 #include "tensegrity/inekf/retraction.hpp"
 #include "tensegrity/math/so3.hpp"
