@@ -39,12 +39,11 @@ DATA = ROOT.parent / "shared" / "data"
 RECORDINGS = {"forward": "forward", "right": "right-turn"}
 """Names of recordings, and the manoeuvres that replace them where there are none."""
 RANGES = ("building45", "outdoor", "rolling_indoor")
-# Short repetitions: whoever else runs on the core then slows down all of one or none.
-TIMING = (
-    "--benchmark_repetitions=7",
-    "--benchmark_min_time=0.03",
-    "--benchmark_enable_random_interleaving=true",
-)
+# Short repetitions: whoever else runs on the core then slows down all of one or none. Calls of
+# microseconds allow for many shorter than the turns in which a core is shared.
+TIMING = ("--benchmark_repetitions=7", "--benchmark_min_time=0.03")
+TIMING_SHORT = ("--benchmark_repetitions=40", "--benchmark_min_time=0.004")
+INTERLEAVED = "--benchmark_enable_random_interleaving=true"
 ENOUGH_ALONE, PATIENCE_S = 5, 20.0
 """A program is run again until of each case so many repetitions had the core, or so long."""
 # Symbols are bound at the start, not by the first call that is counted.
@@ -58,6 +57,8 @@ COUNTING = (
 )
 
 PROGRAMS = ("filter", "tight", "shape", "contact", "cycle", "dynamics", "unscented")
+SHORT = ("filter", "tight", "shape", "contact")
+"""Programs of calls of microseconds."""
 WITH_RECORDINGS = ("shape", "contact", "cycle")
 COUNTED = ("filter", "tight", "shape", "contact", "dynamics", "unscented")
 COUNTED_CYCLES = ("paper", "full")
@@ -145,7 +146,8 @@ def time_program(where: Build, name: str, paths: list[Path], before: Measured) -
 
     def program() -> tuple[Measured, dict[str, Any]]:
         run([str(where.program(name)), *(map(str, paths) if name in WITH_RECORDINGS else ()),
-             f"--benchmark_out={out}", "--benchmark_out_format=json", *TIMING])  # fmt: skip
+             f"--benchmark_out={out}", "--benchmark_out_format=json", INTERLEAVED,
+             *(TIMING_SHORT if name in SHORT else TIMING)])  # fmt: skip
         measured: Measured = {}
         heap: dict[str, int] = {}
         for case in json.loads(out.read_text(encoding="utf-8"))["benchmarks"]:
@@ -284,7 +286,8 @@ def measure(where: Build, resume: bool) -> Results:
         }
     results.versions = versions(where, counting)
     results.commands = [
-        " ".join(["PROGRAM [RECORDING...]", *TIMING]),
+        " ".join(["PROGRAM [RECORDING...]", *TIMING, INTERLEAVED]),
+        " ".join([f"{', '.join(SHORT)}:", *TIMING_SHORT, INTERLEAVED]),
         " ".join([*COUNTING, "PROGRAM [RECORDING...] --count"]),
     ]
     stages = Stages(where.folder, resume)

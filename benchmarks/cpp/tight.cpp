@@ -83,12 +83,8 @@ struct Rig {
     const tight::FootNoise<Scalar> noise{config.creep_std,       config.slip_length,
                                          config.slip_speed,      config.foot_rise_std,
                                          config.foot_height_std, config.friction};
-    const tight::Ground<Scalar> ground(belief);
-    tight::SequentialUpdate<Scalar> update(belief);
-    for (int endcap = 1; endcap < 6; endcap += 2) {
-      tight::correct_foot(update, belief, ground, endcap, shares[std::size_t(endcap)], robot, noise,
-                          dt);
-    }
+    const std::array<tight::Foot<Scalar>, 3> feet{{{1, shares[1]}, {3, shares[3]}, {5, shares[5]}}};
+    tight::correct_feet(belief, feet.data(), 3, robot, noise, dt);
   }
 
   void restart() {

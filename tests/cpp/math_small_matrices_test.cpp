@@ -2,9 +2,12 @@
 #include <doctest/doctest.h>
 
 #include <Eigen/Cholesky>
+#include <array>
+#include <cmath>
 #include <limits>
 
 #include "tensegrity/math/ldlt.hpp"
+#include "tensegrity/math/vector_lanes.hpp"
 
 namespace {
 
@@ -103,6 +106,64 @@ TEST_CASE_TEMPLATE("packets: loads, sums and transposes", Scalar, double, float)
         10 * std::numeric_limits<Scalar>::epsilon());
 }
 
+TEST_CASE_TEMPLATE("packets: number by number", Scalar, double, float) {
+  using P = tensegrity::Packet<Scalar>;
+  using Four = Eigen::Array<Scalar, 4, 1>;
+  const Four a(4, 2, 9, 1), b(-1, 3, 0.5, 7);
+  const auto check = [](const P& x, const Four& expected) {
+    for (int k = 0; k < 4; ++k) CHECK(x.at(k) == doctest::Approx(expected[k]));
+  };
+  const P x(a.data()), y(b.data());
+  check(P::all(3), Four::Constant(3));
+  check(P::sqrt(x), a.sqrt());
+  check(Scalar(2) / x, 2 / a);
+  P sum = y;
+  sum.add(x, y);
+  check(sum, b + a * b);
+  sum.subtract(x, x);
+  check(sum, b + a * b - a * a);
+  check(P::where_greater(x, Scalar(2), x, y), Four(a[0], b[1], a[2], b[3]));
+  check(P::template first<1>(x, y), Four(a[0], b[1], b[2], b[3]));
+  check(P::template first<3>(x, y), Four(a[0], a[1], a[2], b[3]));
+}
+
+TEST_CASE_TEMPLATE("vectors in lanes: what is done to all is done to each", Scalar, double, float) {
+  using tensegrity::Packet;
+  using V = tensegrity::VectorLanes<Scalar>;
+  using V3 = tensegrity::Vector3<Scalar>;
+  const Scalar tolerance = 10 * std::numeric_limits<Scalar>::epsilon();
+  std::array<V3, 4> a, b;
+  for (V3& v : a) v.setRandom();
+  for (V3& v : b) v.setRandom();
+  const tensegrity::Matrix3<Scalar> m = tensegrity::Matrix3<Scalar>::Random();
+  const Scalar factors[] = {1, -2, 3, 0.5};
+  const Packet<Scalar> s(factors);
+  const auto lanes = [](const std::array<V3, 4>& v) {
+    return V::of(Packet<Scalar>(v[0]), Packet<Scalar>(v[1]), Packet<Scalar>(v[2]),
+                 Packet<Scalar>(v[3]));
+  };
+  const V u = lanes(a), v = lanes(b);
+  V more = u, less = u;
+  more.add(s, v);
+  less.subtract(s, v);
+  const V3 any(1, 2, 3);
+  for (int k = 0; k < 4; ++k) {
+    const V3& x = a[std::size_t(k)];
+    const V3& y = b[std::size_t(k)];
+    const auto at = [k](const V& w) { return V3(w.x.at(k), w.y.at(k), w.z.at(k)); };
+    CHECK(at(u) == x);
+    CHECK(at(V::all(any)) == any);
+    CHECK(at(u - v) == x - y);
+    CHECK((at(s * u) - s.at(k) * x).norm() < tolerance);
+    CHECK((at(more) - (x + s.at(k) * y)).norm() < tolerance);
+    CHECK((at(less) - (x - s.at(k) * y)).norm() < tolerance);
+    CHECK(std::abs(V::dot(u, v).at(k) - x.dot(y)) < tolerance);
+    CHECK((at(V::cross(u, v)) - x.cross(y)).norm() < tolerance);
+    CHECK((at(V::transposed_times(m, u)) - m.transpose() * x).norm() < tolerance);
+    CHECK(at(V::where_greater(s, Scalar(0.7), u, v)) == (s.at(k) > Scalar(0.7) ? x : y));
+  }
+}
+
 template <int Rows>
 void check_sum() {
   const Matrix<double, Rows, 5> columns = Matrix<double, Rows, 5>::Random();
@@ -133,7 +194,7 @@ TEST_CASE("columns, outer products and mirrors of part of a covariance") {
     expected.block<20, 5>(8, 3) += 0.7 * p.block<20, 5>(8, 9);
     CHECK((columns - expected).norm() < 1e-14);
 
-    tensegrity::mirror(p, size);
+    tensegrity::mirror(p, 0, size);
     CHECK((p - p.transpose()).norm() == 0);
     for (const int count : {0, 1, 3, 4, 9, 12}) {
       Matrix<double, 28, 12> w = Matrix<double, 28, 12>::Random();
@@ -141,7 +202,9 @@ TEST_CASE("columns, outer products and mirrors of part of a covariance") {
       P reduced = p;
       tensegrity::subtract_outer(reduced, w, count, size);
       const Eigen::MatrixXd used = w.leftCols(count);
-      tensegrity::mirror(reduced, size);
+      tensegrity::mirror(reduced, 0, 8);
+      CHECK(reduced.topLeftCorner<8, 8>() == reduced.topLeftCorner<8, 8>().transpose());
+      tensegrity::mirror(reduced, 8, size);
       CHECK((reduced - (p - used * used.transpose())).norm() < 1e-13);
     }
   }

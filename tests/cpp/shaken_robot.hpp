@@ -31,7 +31,7 @@ void check_valid(const inekf::Belief<Scalar, Extra, Anchors>& belief) {
 template <typename Scalar>
 void check_valid(const tight::Belief<Scalar>& belief) {
   REQUIRE(belief.finite());
-  check_covariance(belief.covariance.template cast<double>(),
+  check_covariance(belief.complete_covariance().template cast<double>(),
                    double(std::numeric_limits<Scalar>::epsilon()));
 }
 

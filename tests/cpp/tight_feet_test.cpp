@@ -1,6 +1,7 @@
 // Feet as measurements: slip and height, and their rows against finite differences.
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -13,6 +14,8 @@ using namespace tensegrity::tight::test;
 using tensegrity::hat;
 using tensegrity::Packet;
 using tensegrity::Prism;
+using tensegrity::VectorLanes;
+using tensegrity::tight::Feet;
 using tensegrity::tight::Foot;
 using tensegrity::tight::FootRows;
 using tensegrity::tight::Ground;
@@ -21,15 +24,26 @@ using M3 = tensegrity::Matrix3<double>;
 constexpr int kSeeds = 20;
 constexpr double kTolerance = 20 * kDerivativeError;  // norms of vectors of some twenty entries
 
-// The row `k` of them.
-VectorXd dense(const FootRows<double>& rows, int k) {
-  VectorXd h(B::Dim);
+FootRows<double> rows_of(const Feet<double>& feet, const V3& first, const V3& second, int foot) {
+  std::array<FootRows<double>, Feet<double>::kMost> rows;
+  feet.rows(VectorLanes<double>::all(first), VectorLanes<double>::all(second), rows.data());
+  return rows[std::size_t(foot)];
+}
+
+// The four rows, by both of their products.
+MatrixXd dense(const FootRows<double>& rows) {
+  MatrixXd h(4, B::Dim);
   const B::Covariance unit = B::Covariance::Identity();
   for (int i = 0; i < B::Dim; i += 4) {
     Packet<double> columns[4];
     rows.times(&unit(0, i), columns, B::Dim);
-    for (int c = 0; c < 4; ++c) h[i + c] = columns[c].at(k);
+    for (int c = 0; c < 4; ++c) {
+      for (int k = 0; k < 4; ++k) h(k, i + c) = columns[c].at(k);
+    }
   }
+  tensegrity::Matrix<double, B::Dim, 4> cross;
+  rows.cross(unit, cross.data());
+  CHECK((h.transpose() - cross).norm() < 1e-14);
   return h;
 }
 
@@ -51,9 +65,28 @@ V3 touching_velocity(const B& belief, int endcap, const Prism<double>& robot, co
   return belief.endcap_velocity(endcap) + omega.cross(-robot.endcap_radius * n);
 }
 
+// All endcaps, three at a time. Calls ask(endcap, spin, feet, lane), spins of rods as they are
+// given.
+template <typename Ask>
+void for_each_foot(const B& belief, const Prism<double>& robot, const std::array<double, 6>& spins,
+                   const Ask& ask) {
+  const Ground<double> ground(belief);
+  const auto foot = [&](int i) { return Foot<double>{i, 1, spins[std::size_t(i)]}; };
+  for (const std::array<int, 3>& three : {std::array{0, 3, 5}, std::array{4, 1, 2}}) {
+    const std::array<Foot<double>, 3> on_ground{{foot(three[0]), foot(three[1]), foot(three[2])}};
+    const Feet<double> feet(belief, ground, on_ground.data(), 3, robot.endcap_radius,
+                            robot.rod_length);
+    for (int k = 0; k < 3; ++k) ask(three[std::size_t(k)], on_ground[std::size_t(k)].spin, feet, k);
+  }
+}
+std::array<double, 6> all_spins(double spin) { return {spin, spin, spin, spin, spin, spin}; }
+
 double height(const B& belief, int endcap, const Prism<double>& robot) {
   const Ground<double> ground(belief);
-  return Foot<double>(belief, ground, endcap, robot.endcap_radius, robot.rod_length).height();
+  const Foot<double> foot{endcap, 1};
+  return Feet<double>(belief, ground, &foot, 1, robot.endcap_radius, robot.rod_length)
+      .height()
+      .at(0);
 }
 
 }  // namespace
@@ -64,14 +97,12 @@ TEST_CASE("feet: the slip is that of the touching point of a rolling sphere") {
     Samples samples(seed);
     const B belief = samples.belief(robot);
     const V3 n = belief.ground_normal();
-    const Ground<double> ground(belief);
-    for (int endcap = 0; endcap < 6; ++endcap) {
-      for (const double spin : {kUnmeasured, 0.0, 1.7}) {
-        const Foot<double> foot(belief, ground, endcap, robot.endcap_radius, robot.rod_length,
-                                spin);
-        CHECK((vector(foot.slip()) - touching_velocity(belief, endcap, robot, n, spin)).norm() <
-              1e-12);
-      }
+    for (const double spin : {kUnmeasured, 0.0, 1.7}) {
+      for_each_foot(belief, robot, all_spins(spin),
+                    [&](int endcap, double, const Feet<double>& feet, int lane) {
+                      const V3 expected = touching_velocity(belief, endcap, robot, n, spin);
+                      CHECK((vector(feet.slip(), lane) - expected).norm() < 1e-12);
+                    });
     }
   }
 }
@@ -90,45 +121,43 @@ TEST_CASE("feet: rows of the slip are its derivative but for rolling's dependenc
     Samples samples(seed);
     const B belief = samples.belief(robot);
     const V3 n = belief.ground_normal();
-    const Ground<double> ground(belief);
     const V3 base_rate = belief.rotation * belief.rate;
-    for (int endcap = 0; endcap < 6; ++endcap) {
-      const double spin = samples.uniform(0, 1) < 0.5 ? kUnmeasured : samples.normal();
-      const Foot<double> foot(belief, ground, endcap, r, robot.rod_length, spin);
-      const MatrixXd numeric = derivative(belief, [&](const B& b) {
-        return VectorXd(touching_velocity(b, endcap, robot, n, spin));
-      });
+    std::array<double, 6> spins;
+    for (double& spin : spins) spin = samples.uniform(0, 1) < 0.5 ? kUnmeasured : samples.normal();
+    // Along anything, not only along the ground.
+    const V3 first = samples.vector(1), second = samples.vector(1);
+    for_each_foot(
+        belief, robot, spins, [&](int endcap, double spin, const Feet<double>& feet, int lane) {
+          const MatrixXd numeric = derivative(belief, [&](const B& b) {
+            return VectorXd(touching_velocity(b, endcap, robot, n, spin));
+          });
 
-      V3 omega = base_rate;
-      MatrixXd left_out = MatrixXd::Zero(3, B::Dim);
-      if (endcap >= 2) {
-        const int even = endcap / 2 * 2;
-        const V3 span = belief.endcap(even) - belief.endcap(even + 1);
-        const V3 u = span.normalized();
-        const V3 turn =
-            (belief.endcap_velocity(even) - belief.endcap_velocity(even + 1)) / robot.rod_length;
-        const bool measured = !std::isnan(spin);
-        const double about_itself = measured ? spin : u.dot(base_rate);
-        omega = u.cross(turn) + u * about_itself;
-        M3 by_direction = -r * (hat(n) * hat(turn) - about_itself * hat(n));
-        if (!measured) by_direction -= r * u.cross(n) * base_rate.transpose();
-        const M3 across = (M3::Identity() - u * u.transpose()) / span.norm();
-        left_out.middleCols<3>(B::endcap_index(even)) = by_direction * across;
-        left_out.middleCols<3>(B::endcap_index(even + 1)) = -by_direction * across;
-      }
-      left_out.middleCols<3>(B::kRotation) = -hat(vector(foot.slip())) - r * hat(omega) * hat(n);
+          V3 omega = base_rate;
+          MatrixXd left_out = MatrixXd::Zero(3, B::Dim);
+          if (endcap >= 2) {
+            const int even = endcap / 2 * 2;
+            const V3 span = belief.endcap(even) - belief.endcap(even + 1);
+            const V3 u = span.normalized();
+            const V3 turn = (belief.endcap_velocity(even) - belief.endcap_velocity(even + 1)) /
+                            robot.rod_length;
+            const bool measured = !std::isnan(spin);
+            const double about_itself = measured ? spin : u.dot(base_rate);
+            omega = u.cross(turn) + u * about_itself;
+            M3 by_direction = -r * (hat(n) * hat(turn) - about_itself * hat(n));
+            if (!measured) by_direction -= r * u.cross(n) * base_rate.transpose();
+            const M3 across = (M3::Identity() - u * u.transpose()) / span.norm();
+            left_out.middleCols<3>(B::endcap_index(even)) = by_direction * across;
+            left_out.middleCols<3>(B::endcap_index(even + 1)) = -by_direction * across;
+          }
+          left_out.middleCols<3>(B::kRotation) =
+              -hat(vector(feet.slip(), lane)) - r * hat(omega) * hat(n);
 
-      // Along anything, not only along the ground.
-      const V3 first = samples.vector(1), second = samples.vector(1);
-      const FootRows<double> rows = foot.rows(Packet<double>(first), Packet<double>(second));
-      const MatrixXd kept = numeric - left_out;
-      CHECK((dense(rows, 0) - kept.transpose() * first).norm() < kTolerance);
-      CHECK((dense(rows, 1) - kept.transpose() * second).norm() < kTolerance);
-      CHECK((dense(rows, 2) - kept.transpose() * n).norm() < kTolerance);
-      VectorXd across(B::Dim);  // its columns are fewer
-      rows.cross(2, B::Covariance::Identity(), across.data());
-      CHECK((across - dense(rows, 2)).norm() < 1e-14);
-    }
+          const MatrixXd rows = dense(rows_of(feet, first, second, lane));
+          const MatrixXd kept = numeric - left_out;
+          CHECK((rows.row(0) - first.transpose() * kept).norm() < kTolerance);
+          CHECK((rows.row(1) - second.transpose() * kept).norm() < kTolerance);
+          CHECK((rows.row(2) - n.transpose() * kept).norm() < kTolerance);
+        });
   }
 }
 
@@ -140,18 +169,18 @@ TEST_CASE("feet: rows of the height are its derivative") {
     Samples samples(seed);
     const B belief = samples.belief(robot);
     const Eigen::Vector2d slope = belief.ground.tail<2>();
-    const Ground<double> ground(belief);
-    for (int endcap = 0; endcap < 6; ++endcap) {
-      const auto height_of = [&](const B& b) {
-        return VectorXd(VectorXd::Constant(1, height(b, endcap, robot)));
-      };
-      VectorXd expected = derivative(belief, height_of).transpose();
-      expected.segment<2>(B::kGround + 1) +=
-          robot.endcap_radius * slope / std::sqrt(1 + slope.squaredNorm());
-      const Foot<double> foot(belief, ground, endcap, robot.endcap_radius, robot.rod_length);
-      const Packet<double> any = ground.across_y;
-      CHECK((dense(foot.rows(any, any), 3) - expected).norm() < kTolerance);
-    }
+    const V3 any = samples.vector(1);
+    for_each_foot(
+        belief, robot, all_spins(kUnmeasured),
+        [&](int endcap, double, const Feet<double>& feet, int lane) {
+          const auto height_of = [&](const B& b) {
+            return VectorXd(VectorXd::Constant(1, height(b, endcap, robot)));
+          };
+          MatrixXd expected = derivative(belief, height_of);
+          expected.block<1, 2>(0, B::kGround + 1) +=
+              robot.endcap_radius * slope.transpose() / std::sqrt(1 + slope.squaredNorm());
+          CHECK((dense(rows_of(feet, any, any, lane)).row(3) - expected).norm() < kTolerance);
+        });
   }
 }
 
@@ -173,7 +202,6 @@ TEST_CASE("feet: across y along the ground is a unit vector across the normal") 
   const Prism<double> robot;
   Samples samples(2);
   const Ground<double> ground(samples.belief(robot));
-  const V3 along = vector(ground.across_y);
-  CHECK(along.norm() == doctest::Approx(1));
-  CHECK(std::abs(along.dot(vector(ground.normal))) < 1e-15);
+  CHECK(ground.across_y.norm() == doctest::Approx(1));
+  CHECK(std::abs(ground.across_y.dot(ground.normal)) < 1e-15);
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "tensegrity/tight/friction.hpp"
 #include "tight_samples.hpp"
@@ -12,11 +13,12 @@ namespace {
 
 using namespace tensegrity::tight::test;
 using tensegrity::Prism;
-using tensegrity::tight::correct_foot;
+using tensegrity::tight::correct_feet;
+using tensegrity::tight::Feet;
 using tensegrity::tight::Foot;
 using tensegrity::tight::FootNoise;
+using tensegrity::tight::FootResult;
 using tensegrity::tight::Ground;
-using tensegrity::tight::SequentialUpdate;
 using V2 = Eigen::Vector2d;
 
 const Prism<double> kRobot;
@@ -44,14 +46,22 @@ class Sliding {
   }
 
   V2 velocity() const { return plane.transpose() * belief.velocity(); }
-  V2 slip(int endcap) const {
+  template <typename Ask>
+  auto with_foot(int endcap, const Ask& ask) const {
     const Ground<double> ground(belief);
-    const Foot<double> foot(belief, ground, endcap, kRobot.endcap_radius, kRobot.rod_length);
-    return plane.transpose() * vector(foot.slip());
+    const Foot<double> foot{endcap, 1};
+    return ask(Feet<double>(belief, ground, &foot, 1, kRobot.endcap_radius, kRobot.rod_length));
+  }
+  V2 slip(int endcap) const {
+    return with_foot(
+        endcap, [&](const auto& foot) { return V2(plane.transpose() * vector(foot.slip(), 0)); });
   }
   double height(int endcap) const {
-    const Ground<double> ground(belief);
-    return Foot<double>(belief, ground, endcap, kRobot.endcap_radius, kRobot.rod_length).height();
+    return with_foot(endcap, [&](const auto& foot) { return foot.height().at(0); });
+  }
+  FootResult<double> correct(int endcap, double share) {
+    const Foot<double> foot{endcap, share};
+    return correct_feet(belief, &foot, 1, kRobot, kNoise, kDt)[0];
   }
   // Velocity at which a foot would stand.
   V2 standing(int endcap) const { return velocity() - slip(endcap); }
@@ -121,16 +131,14 @@ void check_converges(double slope) {
     for (const V2& x : standing) stands = stands || x == expected.velocity;
     (stands ? on_a_foot : between) += 1;
 
+    std::array<Foot<double>, 3> feet;
+    for (std::size_t i = 0; i < 3; ++i) feet[i] = {kFeet[i], share[i]};
     // As an IMU would: without it P shrinks, and the mean stops on its way.
     const double unrest = 0.02;  // [m/s] per sample, 4 m/s^2
     for (int k = 0; k < 400; ++k) {
       robot.belief.covariance +=
           unrest * unrest * robot.together.lazyProduct(robot.together.transpose());
-      const Ground<double> ground(robot.belief);
-      SequentialUpdate<double> update(robot.belief);
-      for (std::size_t i = 0; i < 3; ++i) {
-        correct_foot(update, robot.belief, ground, kFeet[i], share[i], kRobot, kNoise, kDt);
-      }
+      correct_feet(robot.belief, feet.data(), 3, kRobot, kNoise, kDt);
     }
     const double std = std::sqrt(robot.variance(V2::UnitX()) + robot.variance(V2::UnitY()));
     CHECK((robot.velocity() - expected.velocity).norm() < 0.1 * std);
@@ -159,12 +167,7 @@ TEST_CASE("one foot on level ground pulls with its friction and informs across i
     const V2 along = slip / speed, across(-along.y(), along.x());
     const double p = prior * prior;
     const double r = (kNoise.creep * kNoise.creep + kNoise.slip_length * speed / share) / kDt;
-    {
-      SequentialUpdate<double> update(robot.belief);
-      const auto result = correct_foot(update, robot.belief, Ground<double>(robot.belief), 3, share,
-                                       kRobot, kNoise, kDt);
-      CHECK(result.speed == doctest::Approx(speed));
-    }
+    CHECK(robot.correct(3, share).speed == doctest::Approx(speed));
     CHECK((robot.velocity() - (start - p / (p + r) * slip)).norm() < 1e-12);
     CHECK(robot.variance(across) == doctest::Approx(p * r / (p + r)));
     const double informed = kNoise.slip_speed / (kNoise.slip_speed + speed);
@@ -179,10 +182,7 @@ TEST_CASE("a foot that stands still informs in every direction, as far as it cre
   robot.belief.columns.rightCols<4>().setZero();
   robot.belief.columns.col(0).setZero();
   robot.belief.rate.setZero();
-  {
-    SequentialUpdate<double> update(robot.belief);
-    correct_foot(update, robot.belief, Ground<double>(robot.belief), 5, 0.4, kRobot, kNoise, kDt);
-  }
+  robot.correct(5, 0.4);
   const double p = 0.01, r = kNoise.creep * kNoise.creep / kDt;
   for (const V2& direction : {V2(1, 0), V2(0, 1), V2(0.6, 0.8)}) {
     CHECK(robot.variance(direction) == doctest::Approx(p * r / (p + r)));
@@ -201,17 +201,32 @@ TEST_CASE("height: a foot that carries a third or more is held on the plane, les
       }
     }
     const double above = robot.height(5);
-    double chi_square;
-    {
-      SequentialUpdate<double> update(robot.belief);
-      const auto result = correct_foot(update, robot.belief, Ground<double>(robot.belief), 5, share,
-                                       kRobot, kNoise, kDt);
-      CHECK(result.height == above);
-      chi_square = result.height_chi_square;
-    }
+    const FootResult<double> result = robot.correct(5, share);
+    CHECK(result.height == above);
+    const double chi_square = result.height_chi_square;
     const double touching = std::min(std::max(3 * share, 0.005), 1.0);
     const double r = kNoise.height * kNoise.height / (kDt * touching * touching);
     CHECK(chi_square == doctest::Approx(above * above / (p + r)));
     CHECK(robot.height(5) == doctest::Approx(above * r / (p + r)));
   }
+}
+
+TEST_CASE("feet that are not finite are left out, and the others correct") {
+  Samples samples(3);
+  const B prior = samples.belief(kRobot);
+  B alone = prior, with_bad = prior;
+  const double infinity = std::numeric_limits<double>::infinity();
+  const std::array<Foot<double>, 3> feet{{{0, 0.4}, {3, 0.3, infinity}, {5, 0.3}}};
+  const std::array<Foot<double>, 2> good{{feet[0], feet[2]}};
+  const auto expected = correct_feet(alone, good.data(), 2, kRobot, kNoise, kDt);
+  const auto results = correct_feet(with_bad, feet.data(), 3, kRobot, kNoise, kDt);
+  CHECK(with_bad.columns == alone.columns);
+  CHECK(with_bad.complete_covariance() == alone.complete_covariance());
+  CHECK(results[0].height_chi_square == expected[0].height_chi_square);
+  CHECK(std::isnan(results[1].height_chi_square));
+  CHECK(results[2].height_chi_square == expected[1].height_chi_square);
+
+  const auto none = correct_feet(with_bad, &feet[1], 1, kRobot, kNoise, kDt);
+  CHECK(with_bad.columns == alone.columns);
+  CHECK(std::isnan(none[0].height_chi_square));
 }

@@ -37,11 +37,9 @@ void correct_by_shape(B& belief, const CableLengths<double>& lengths) {
 }
 
 void correct_by_ground(B& belief) {
-  const tensegrity::tight::Ground<double> ground(belief);
-  SequentialUpdate<double> update(belief);
-  for (const int foot : {0, 3, 5}) {
-    tensegrity::tight::correct_foot(update, belief, ground, foot, 1.0 / 3, kRobot, kFeet, 0.005);
-  }
+  const std::array<tensegrity::tight::Foot<double>, 3> feet{
+      {{0, 1.0 / 3}, {3, 1.0 / 3}, {5, 1.0 / 3}}};
+  tensegrity::tight::correct_feet(belief, feet.data(), 3, kRobot, kFeet, 0.005);
 }
 
 // A world whose frame is turned about the vertical and moved.
@@ -61,7 +59,7 @@ struct Frame {
     for (int c = 1; c < 6; ++c) out.columns.col(c) += shift;  // positions
     out.ground = ground(belief.ground);
     const MatrixXd a = errors();
-    out.covariance = sandwich(a, belief.covariance, MatrixXd::Zero(B::Dim, B::Dim));
+    out.covariance = sandwich(a, belief.complete_covariance(), MatrixXd::Zero(B::Dim, B::Dim));
     return out;
   }
   // The adjoint: errors of the one world in the frame of the other.
@@ -102,8 +100,8 @@ TEST_CASE("a world turned about the vertical and moved gives the same estimate i
       }
       const B expected = frame(here);
       worst_state = std::max(worst_state, difference(there, expected).norm());
-      worst_covariance =
-          std::max(worst_covariance, distance(there.covariance, expected.covariance));
+      worst_covariance = std::max(
+          worst_covariance, distance(there.complete_covariance(), expected.complete_covariance()));
     }
     CHECK(worst_state < 1e-7);
     CHECK(worst_covariance < 1e-7);

@@ -91,13 +91,13 @@ MatrixXd derivative(const B& belief, const std::function<VectorXd(const B&)>& f)
 }
 
 B dense_update(const B& belief, const MatrixXd& h, const VectorXd& z, const VectorXd& variances) {
-  const MatrixXd p = belief.covariance;
+  const MatrixXd p = belief.complete_covariance();
   const MatrixXd hp = h * p;
   MatrixXd s = hp * h.transpose();
   s.diagonal() += variances;
   const Eigen::LLT<MatrixXd> llt(s);
   B updated = belief;
-  updated.covariance -= hp.transpose() * llt.solve(hp);
+  updated.covariance = p - hp.transpose() * llt.solve(hp);
   updated.retract(hp.transpose() * llt.solve(z));
   return updated;
 }
@@ -106,8 +106,13 @@ MatrixXd sandwich(const MatrixXd& f, const MatrixXd& p, const MatrixXd& q) {
   return f * p * f.transpose() + q;
 }
 
+bool symmetric(const B& belief) {
+  const auto p = belief.covariance.topLeftCorner<B::kComplete, B::kComplete>();
+  return p == p.transpose();
+}
+
 MatrixXd information(const B& belief) {
-  const MatrixXd p = belief.covariance.topLeftCorner<kStates, kStates>();
+  const MatrixXd p = belief.complete_covariance().topLeftCorner<kStates, kStates>();
   return Eigen::LLT<MatrixXd>(p).solve(MatrixXd::Identity(kStates, kStates));
 }
 

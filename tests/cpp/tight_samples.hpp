@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 
+#include "tensegrity/math/vector_lanes.hpp"
 #include "tensegrity/robot/prism.hpp"
 #include "tensegrity/tight/belief.hpp"
 
@@ -17,7 +18,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 // States of the belief; what its vectors have beyond is always zero.
-inline constexpr int kStates = B::kGround + 3;
+inline constexpr int kStates = B::kOffsets + 9;
 
 class Samples {
  public:
@@ -41,8 +42,10 @@ class Samples {
   std::unique_ptr<State> state_;
 };
 
-// The three numbers of a packet.
-inline V3 vector(const Packet<double>& x) { return {x.at(0), x.at(1), x.at(2)}; }
+// The vector in a lane.
+inline V3 vector(const VectorLanes<double>& v, int lane) {
+  return {v.x.at(lane), v.y.at(lane), v.z.at(lane)};
+}
 
 // X <- Exp(e) X, theta <- theta + e.
 B perturbed(const B& belief, const VectorXd& e);
@@ -60,6 +63,9 @@ B dense_update(const B& belief, const MatrixXd& h, const VectorXd& z, const Vect
 
 // F P F' + Q.
 MatrixXd sandwich(const MatrixXd& f, const MatrixXd& p, const MatrixXd& q);
+
+// Whether P is symmetric where the filter reads it.
+bool symmetric(const B& belief);
 
 // P^-1 of the states [kStates x kStates].
 MatrixXd information(const B& belief);

@@ -1,11 +1,13 @@
-// Corrections one row at a time: the result is that of the joint update.
+// Corrections one row at a time, and by all feet at once: the result is that of the joint update.
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "tensegrity/tight/feet_update.hpp"
 #include "tensegrity/tight/sequential_update.hpp"
 #include "tight_samples.hpp"
 
@@ -14,9 +16,11 @@ namespace {
 using namespace tensegrity::tight::test;
 using tensegrity::Packet;
 using tensegrity::Prism;
+using tensegrity::tight::FeetUpdate;
 using tensegrity::tight::FootRows;
 using tensegrity::tight::Row;
 using tensegrity::tight::SequentialUpdate;
+using M3 = tensegrity::Matrix3<double>;
 
 struct Measurement {
   Row<double> row;
@@ -43,34 +47,55 @@ Measurement any_measurement(Samples& samples) {
   return m;
 }
 
-struct FootMeasurement {
-  FootRows<double> rows;
+// Four rows of each of `count` feet: dense, and as they are taken.
+struct FeetMeasurement {
+  int count;
   MatrixXd dense;
-  Eigen::Vector4d residual, variance;
+  VectorXd residual, variance, information;
+  std::array<FootRows<double>, FeetUpdate<double>::kFeet> rows{};
+
+  void fill(FeetUpdate<double>& update) const {
+    std::copy(rows.begin(), rows.end(), update.rows());
+    update.set_residuals(lanes(residual, 0), lanes(residual, 1), lanes(residual, 2),
+                         lanes(residual, 3));
+    update.set_variances(lanes(variance, 0), lanes(variance, 1), lanes(variance, 2),
+                         lanes(variance, 3));
+    update.set_information(lanes(information, 0), lanes(information, 1), lanes(information, 2),
+                           lanes(information, 3));
+  }
+  // Row `k` of every foot.
+  Packet<double> lanes(const VectorXd& x, int k) const {
+    std::array<double, 4> out{};
+    for (int f = 0; f < count; ++f) out[std::size_t(f)] = x[4 * f + k];
+    return Packet<double>(out.data());
+  }
 };
 
-Packet<double> packet(const Eigen::Vector4d& x) { return {x[0], x[1], x[2], x[3]}; }
-
-FootMeasurement any_foot(Samples& samples) {
-  FootMeasurement m{{}, MatrixXd::Zero(4, B::Dim), 0.1 * samples.normal(4, 1), {}};
-  for (int k = 0; k < 4; ++k) m.variance[k] = samples.uniform(1e-4, 1e-2);
-  const int slip = int(samples.uniform(1, FootRows<double>::kBlocks + 1));
-  const int across = int(samples.uniform(1, slip + 1));
-  for (int k = 0; k < slip; ++k) {
-    const int at = 3 * int(samples.uniform(0, 5)) + 15 * k;
-    const V3 a = samples.vector(1), b = samples.vector(1),
-             c = k < across ? samples.vector(1) : V3(V3::Zero());
-    m.rows.add_slip(at, Packet<double>(a), Packet<double>(b), Packet<double>(c));
-    m.dense.block<1, 3>(0, at) = a.transpose();
-    m.dense.block<1, 3>(1, at) = b.transpose();
-    m.dense.block<1, 3>(2, at) = c.transpose();
-  }
-  m.rows.limit_across(across);
-  for (int k = 0; k < FootRows<double>::kBlocks; ++k) {
-    const int at = 3 * int(samples.uniform(0, 5)) + 15 * k;
-    const V3 h = samples.vector(1);
-    m.rows.set_height(k, at, Packet<double>(h));
-    m.dense.block<1, 3>(3, at) = h.transpose();
+FeetMeasurement any_feet(Samples& samples, int count) {
+  const int size = 4 * count;
+  FeetMeasurement m{count, MatrixXd::Zero(size, B::Dim), 0.1 * samples.normal(size, 1),
+                    VectorXd(size), VectorXd::Ones(size)};
+  for (int k = 0; k < size; ++k) m.variance[k] = samples.uniform(1e-4, 1e-2);
+  for (int f = 0; f < count; ++f) {
+    FootRows<double>& rows = m.rows[std::size_t(f)];
+    const int slip = int(samples.uniform(1, FootRows<double>::kBlocks + 1));
+    const int across = int(samples.uniform(1, slip + 1));
+    rows.limit(slip, across);
+    for (int k = 0; k < FootRows<double>::kBlocks; ++k) {
+      // Feet do not look at the cables' offsets.
+      const int at = 3 * int(samples.uniform(0, 4)) + 12 * k;
+      M3 h = M3::Zero();  // a row for each of the slip's
+      for (int row = 0; row < 3; ++row) {
+        if (k < (row < 2 ? slip : across)) h.row(row) = samples.vector(1).transpose();
+      }
+      rows.set_slip(k, at, Packet<double>(V3(h.col(0))), Packet<double>(V3(h.col(1))),
+                    Packet<double>(V3(h.col(2))));
+      m.dense.block<3, 3>(4 * f, at) = h;
+      const int below = 3 * int(samples.uniform(0, 4)) + 12 * k;
+      const V3 height = samples.vector(1);
+      rows.set_height(k, below, Packet<double>(height));
+      m.dense.block<1, 3>(4 * f + 3, below) = height.transpose();
+    }
   }
   return m;
 }
@@ -107,107 +132,103 @@ TEST_CASE("rows one by one are the joint update, in any order and number") {
         CHECK(belief.columns == prior.columns);  // the mean moves once, at the end
       }
       CHECK(difference(belief, expected).norm() < 1e-10);
-      CHECK(distance(belief.covariance, expected.covariance) < 1e-12);
-      CHECK((belief.covariance - belief.covariance.transpose()).norm() == 0);
+      CHECK(distance(belief.complete_covariance(), expected.covariance) < 1e-12);
+      CHECK(symmetric(belief));
       std::reverse(all.begin(), all.end());
     }
   }
 }
 
-TEST_CASE("the rows of feet are rows like others, before, after and between them") {
+TEST_CASE("feet: all rows at once are the joint update") {
   const Prism<double> robot;
   for (unsigned seed = 0; seed < 30; ++seed) {
-    Samples samples(seed);
-    const B prior = samples.belief(robot);
-    // Up to six feet, and a few single rows: batches get full, and begin anywhere.
-    MatrixXd h(0, B::Dim);
-    VectorXd z(0), variances(0);
-    double chi_square = 0;
-    B belief = prior;
-    const auto stack = [&](const MatrixXd& rows, const VectorXd& residual, const VectorXd& var) {
-      const Eigen::Index n = z.size() + residual.size();
-      h.conservativeResize(n, Eigen::NoChange);
-      h.bottomRows(rows.rows()) = rows;
-      z.conservativeResize(n);
-      z.tail(residual.size()) = residual;
-      variances.conservativeResize(n);
-      variances.tail(var.size()) = var;
-    };
-    {
-      SequentialUpdate<double> update(belief);
-      const int steps = int(samples.uniform(1, 9));
-      for (int step = 0; step < steps; ++step) {
-        if (samples.uniform(0, 1) < 0.6) {
-          const FootMeasurement m = any_foot(samples);
-          const Packet<double> parts =
-              update.correct(m.rows, packet(m.residual), packet(m.variance), {1.0, 1.0, 1.0, 1.0});
-          for (int k = 0; k < 4; ++k) chi_square += parts.at(k);
-          stack(m.dense, m.residual, m.variance);
-        } else {
-          const Measurement m = any_measurement(samples);
-          chi_square += update.correct(m.row, m.residual, m.variance);
-          stack(m.dense.transpose(), VectorXd::Constant(1, m.residual),
-                VectorXd::Constant(1, m.variance));
-        }
-      }
+    for (int count = 1; count <= FeetUpdate<double>::kFeet; ++count) {
+      Samples samples(seed);
+      const B prior = samples.belief(robot);
+      const FeetMeasurement m = any_feet(samples, count);
+      B belief = prior;
+      FeetUpdate<double> update;
+      m.fill(update);
+      CHECK(update.apply(belief, count));
+      const B expected = dense_update(prior, m.dense, m.residual, m.variance);
+      CHECK(difference(belief, expected).norm() < 1e-10);
+      CHECK(distance(belief.complete_covariance(), expected.covariance) < 1e-12);
+      CHECK(symmetric(belief));
+      double chi_square = 0;
+      for (int k = 0; k < 4 * count; ++k) chi_square += update.chi_square(k);
+      const MatrixXd s =
+          m.dense * prior.covariance * m.dense.transpose() + MatrixXd(m.variance.asDiagonal());
+      CHECK(chi_square ==
+            doctest::Approx(m.residual.dot(s.ldlt().solve(m.residual))).epsilon(1e-9));
     }
-    const B expected = dense_update(prior, h, z, variances);
-    CHECK(difference(belief, expected).norm() < 1e-10);
-    CHECK(distance(belief.covariance, expected.covariance) < 1e-12);
-    const MatrixXd s = h * prior.covariance * h.transpose() + MatrixXd(variances.asDiagonal());
-    CHECK(chi_square == doctest::Approx(z.dot(s.ldlt().solve(z))).epsilon(1e-9));
   }
 }
 
-TEST_CASE("of a foot each row informs by its own part") {
+TEST_CASE("feet: each row informs by its own part") {
   const Prism<double> robot;
   Samples samples(7);
   const B prior = samples.belief(robot);
-  const FootMeasurement m = any_foot(samples);
-  const auto corrected = [&](const Eigen::Vector4d& information) {
+  FeetMeasurement m = any_feet(samples, 3);
+  const auto corrected = [&] {
     B belief = prior;
-    SequentialUpdate<double>(belief).correct(m.rows, packet(m.residual), packet(m.variance),
-                                             packet(information));
+    FeetUpdate<double> update;
+    m.fill(update);
+    CHECK(update.apply(belief, m.count));
     return belief;
   };
-  const B whole = corrected(Eigen::Vector4d::Ones());
+  const B all = corrected();
+  m.information << 0.3, 1, 0, 0.8, 1, 0.1, 1, 1, 0, 0.5, 0.9, 1;
   MatrixXd expected = prior.covariance;
-  const Eigen::Vector4d parts(0.3, 1, 0, 0.8);
   B before = prior;
-  for (int k = 0; k < 4; ++k) {  // one after the other, each given those before it
+  for (int k = 0; k < 4 * m.count; ++k) {  // one after the other, each given those before it
     const B after =
         dense_update(before, m.dense.row(k), m.residual.segment<1>(k), m.variance.segment<1>(k));
-    expected += parts[k] * (after.covariance - before.covariance);
+    expected += m.information[k] * (after.covariance - before.covariance);
     before.covariance = after.covariance;
   }
-  const B part = corrected(parts);
-  CHECK(part.columns == whole.columns);
-  CHECK(distance(part.covariance, expected) < 1e-12);
+  const B part = corrected();
+  CHECK(part.columns == all.columns);
+  CHECK(distance(part.complete_covariance(), expected) < 1e-12);
 }
 
-TEST_CASE("a foot with a row that is not finite changes nothing") {
+TEST_CASE("feet: what is not finite changes nothing, a silent foot nothing of the others") {
   const Prism<double> robot;
   Samples samples(8);
   const B prior = samples.belief(robot);
-  const FootMeasurement m = any_foot(samples), bad = any_foot(samples);
-  const Packet<double> whole(1.0, 1.0, 1.0, 1.0);
-  const auto correct_both = [&](B& belief) {
-    SequentialUpdate<double> update(belief);
-    for (int k = 0; k < 4; ++k) {
-      Eigen::Vector4d residual = bad.residual;
-      residual[k] = std::numeric_limits<double>::quiet_NaN();
-      update.correct(bad.rows, packet(residual), packet(bad.variance), whole);
-    }
-    FootRows<double> infinite = bad.rows;
-    infinite.set_height(1, 0, Packet<double>(V3(0, std::numeric_limits<double>::infinity(), 0)));
-    update.correct(infinite, packet(bad.residual), packet(bad.variance), whole);
-    update.correct(m.rows, packet(m.residual), packet(m.variance), whole);
-  };
-  B belief = prior, alone = prior;
-  correct_both(belief);
-  SequentialUpdate<double>(alone).correct(m.rows, packet(m.residual), packet(m.variance), whole);
-  CHECK(belief.columns == alone.columns);
-  CHECK(belief.covariance == alone.covariance);
+  const FeetMeasurement m = any_feet(samples, 3);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (int k = 0; k < 12; ++k) {
+    FeetMeasurement bad = m;
+    bad.residual[k] = nan;
+    B belief = prior;
+    FeetUpdate<double> update;
+    bad.fill(update);
+    CHECK_FALSE(update.apply(belief, 3));
+    check_unchanged(belief, prior);
+    bad.fill(update);
+    update.silence(k / 4);
+    CHECK(update.apply(belief, 3));
+    CHECK(difference(belief, prior).norm() > 1e-6);
+  }
+  for (int foot = 0; foot < 3; ++foot) {
+    FeetMeasurement bad = m;
+    bad.rows[std::size_t(foot)].set_height(1, 6, Packet<double>(V3(0, nan, 0)));
+    B belief = prior;
+    FeetUpdate<double> update;
+    bad.fill(update);
+    CHECK_FALSE(update.apply(belief, 3));
+    check_unchanged(belief, prior);
+    bad.fill(update);
+    update.silence(foot);
+    CHECK(update.apply(belief, 3));
+    MatrixXd others = m.dense;
+    others.middleRows<4>(4 * foot).setZero();
+    VectorXd residual = m.residual;
+    residual.segment<4>(4 * foot).setZero();
+    const B expected = dense_update(prior, others, residual, m.variance);
+    CHECK(difference(belief, expected).norm() < 1e-10);
+    CHECK(distance(belief.complete_covariance(), expected.covariance) < 1e-12);
+  }
 }
 
 TEST_CASE("the chi-squares of the rows add up to that of the joint innovation") {
@@ -263,11 +284,11 @@ TEST_CASE("information scales the downdate of P, and leaves the mean's step whol
     SequentialUpdate<double>(belief).correct(m.row, m.residual, m.variance, 0.0, information);
     return belief;
   };
-  const B whole = corrected(1), none = corrected(0), part = corrected(0.3);
-  CHECK(difference(whole, prior).norm() > 0);
-  CHECK(none.columns == whole.columns);
-  CHECK(part.columns == whole.columns);
-  CHECK(none.covariance == prior.covariance);
-  const MatrixXd expected = prior.covariance + 0.3 * (whole.covariance - prior.covariance);
-  CHECK(distance(part.covariance, expected) < 1e-14);
+  const B all = corrected(1), none = corrected(0), part = corrected(0.3);
+  CHECK(difference(all, prior).norm() > 0);
+  CHECK(none.columns == all.columns);
+  CHECK(part.columns == all.columns);
+  CHECK(none.complete_covariance() == prior.covariance);
+  const MatrixXd expected = prior.covariance + 0.3 * (all.complete_covariance() - prior.covariance);
+  CHECK(distance(part.complete_covariance(), expected) < 1e-14);
 }

@@ -40,11 +40,14 @@ template class TightFilter<SCALAR>;
 template class LooseFilter<SCALAR>;
 template class shape::Solver<SCALAR>;
 template class shape::Tracker<SCALAR>;
-template class tight::Foot<SCALAR>;
+template class tight::Feet<SCALAR>;
+template class tight::FeetUpdate<SCALAR>;
 template class tight::FootRows<SCALAR>;
 template struct tight::Ground<SCALAR>;
 template class tight::Row<SCALAR>;
 template class tight::SequentialUpdate<SCALAR>;
+template struct tight::WaitingRows<SCALAR>;
+template struct VectorLanes<SCALAR>;
 #endif
 
 }  // namespace tensegrity

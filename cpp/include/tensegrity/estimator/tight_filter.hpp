@@ -272,22 +272,25 @@ class TightFilter {
     const tight::FootNoise<Scalar> noise{config_.creep_std,       config_.slip_length,
                                          config_.slip_speed,      config_.foot_rise_std,
                                          config_.foot_height_std, config_.friction};
-    worst_height_ = 0;
-    slowest_foot_ = std::numeric_limits<Scalar>::max();
-    const tight::Ground<Scalar> ground(belief_);
-    tight::SequentialUpdate<Scalar> update(belief_);
-    Scalar chi_square = 0, feet = 0;
+    std::array<tight::Foot<Scalar>, tight::Feet<Scalar>::kMost> feet;  // as many as have a share
+    std::size_t count = 0;
     for (int endcap = 0; endcap < 6; ++endcap) {
       const Scalar share = shares[std::size_t(endcap)];
-      if (!(share > 0)) continue;
-      const auto foot = tight::correct_foot(update, belief_, ground, endcap, share, robot_, noise,
-                                            dt, spin(endcap / 2));
-      chi_square += foot.height_chi_square;
-      feet += 1;
-      if (share > kWatchedShare) worst_height_ = std::max(worst_height_, std::abs(foot.height));
-      slowest_foot_ = std::min(slowest_foot_, foot.speed);
+      if (share > 0 && count < feet.size()) feet[count++] = {endcap, share, spin(endcap / 2)};
     }
-    if (feet > 0) ground_nis_ = chi_square / feet;
+    const auto results = tight::correct_feet(belief_, feet.data(), int(count), robot_, noise, dt);
+    worst_height_ = 0;
+    slowest_foot_ = std::numeric_limits<Scalar>::max();
+    Scalar chi_square = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto& result = results[k];
+      chi_square += result.height_chi_square;
+      if (feet[k].share > kWatchedShare) {
+        worst_height_ = std::max(worst_height_, std::abs(result.height));
+      }
+      slowest_foot_ = std::min(slowest_foot_, result.speed);
+    }
+    if (count > 0) ground_nis_ = chi_square / Scalar(count);
   }
 
   // The declaration that the ground is flat: tested once the slope is known, and watched from then

@@ -89,10 +89,10 @@ struct Belief : BodyError {
   }
 
   // Copies what is below the covariance's diagonal to above it.
-  void complete() { mirror(covariance, padded(dim())); }
+  void complete() { mirror(covariance, 0, padded(dim())); }
   Covariance complete_covariance() const {
     Covariance p = covariance;
-    mirror(p, padded(dim()));
+    mirror(p, 0, padded(dim()));
     return p;
   }
 

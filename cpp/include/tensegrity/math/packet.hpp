@@ -114,6 +114,16 @@ class Packet {
     for (int k = 0; k < kRegisters; ++k) part_[k] -= a * x.part_[k];
   }
 
+  // Number by number.
+  void add(const Packet& a, const Packet& x) {
+#pragma GCC unroll 4
+    for (int k = 0; k < kRegisters; ++k) part_[k] += a.part_[k] * x.part_[k];
+  }
+  void subtract(const Packet& a, const Packet& x) {
+#pragma GCC unroll 4
+    for (int k = 0; k < kRegisters; ++k) part_[k] -= a.part_[k] * x.part_[k];
+  }
+
   friend Packet operator*(Scalar a, Packet x) {
 #pragma GCC unroll 4
     for (int k = 0; k < kRegisters; ++k) x.part_[k] *= a;
@@ -133,6 +143,33 @@ class Packet {
 #pragma GCC unroll 4
     for (int k = 0; k < kRegisters; ++k) x.part_[k] -= y.part_[k];
     return x;
+  }
+
+  friend Packet operator/(Scalar a, Packet x) {
+#pragma GCC unroll 4
+    for (int k = 0; k < kRegisters; ++k) x.part_[k] = a / x.part_[k];
+    return x;
+  }
+
+  // Four times the same number.
+  static Packet all(Scalar a) { return {a, a, a, a}; }
+
+  static Packet sqrt(const Packet& x) {
+    // Eigen's does not set errno, for which the standard's leaves the registers.
+    using Four = Eigen::Array<Scalar, 4, 1>;
+    Four numbers;
+    x.store(numbers.data());
+    numbers = numbers.sqrt().eval();
+    return Packet(numbers.data());
+  }
+
+  // The numbers of `yes` where those of x are greater than `limit`, else those of `no`.
+  static Packet where_greater(const Packet& x, Scalar limit, Packet yes, const Packet& no) {
+#pragma GCC unroll 4
+    for (int k = 0; k < kRegisters; ++k) {
+      yes.part_[k] = x.part_[k] > limit ? yes.part_[k] : no.part_[k];
+    }
+    return yes;
   }
 
   // The first three numbers.
@@ -197,6 +234,22 @@ class Packet {
     }
 #endif
     return {x.at(A), x.at(B), x.at(C), x.at(D)};
+  }
+
+  // The first `Count` numbers of x, the others of y.
+  template <int Count>
+  static Packet first(const Packet& x, const Packet& y) {
+#if __has_builtin(__builtin_shufflevector)
+    if constexpr (kRegisters == 1) {
+      Packet out;
+      out.part_[0] =
+          __builtin_shufflevector(x.part_[0], y.part_[0], Count > 0 ? 0 : 4, Count > 1 ? 1 : 5,
+                                  Count > 2 ? 2 : 6, Count > 3 ? 3 : 7);
+      return out;
+    }
+#endif
+    return {Count > 0 ? x.at(0) : y.at(0), Count > 1 ? x.at(1) : y.at(1),
+            Count > 2 ? x.at(2) : y.at(2), Count > 3 ? x.at(3) : y.at(3)};
   }
 
   // The first three numbers of x, and y's number in `Row`.

@@ -1,7 +1,7 @@
 // What a filter does to its covariance all day, written for the columns of a matrix in memory.
 //
-// A covariance is computed in its lower triangle, and stored in full, so that any of its columns
-// can be read at once after a `mirror`. Loops run over whole packets of four rows: matrices here
+// A covariance is computed in its lower triangle, and columns that are read as a whole get their
+// upper part by a `mirror`. Loops run over whole packets of four rows: matrices here
 // have a multiple of four rows (`padded`), and are zero beyond their active size.
 #pragma once
 
@@ -9,6 +9,27 @@
 #include "tensegrity/types.hpp"
 
 namespace tensegrity {
+
+// Columns of numbers in memory, `Stride` apart.
+template <typename Scalar, int Stride>
+struct Columns {
+  Scalar* first;
+
+  Columns from(int row) const { return {first + row}; }
+  Columns from_column(int column) const { return {first + column * Stride}; }
+  Scalar* operator[](int column) const { return first + column * Stride; }
+};
+
+// Of a matrix, or of a block of whole columns or rows.
+template <typename Derived>
+auto columns(Eigen::PlainObjectBase<Derived>& m) {
+  return Columns<typename Derived::Scalar, Derived::OuterStrideAtCompileTime>{m.data()};
+}
+template <typename Derived>
+auto columns(const Eigen::MatrixBase<Derived>& m) {
+  return Columns<const typename Derived::Scalar, Derived::OuterStrideAtCompileTime>{
+      m.derived().data()};
+}
 
 // `count` columns from `to` on get `factor` times those from `from` on, in the rows from `first` (a
 // multiple of four) on.
@@ -27,37 +48,44 @@ void add_columns(Eigen::MatrixBase<Derived>& p, int to, int from, int count,
   }
 }
 
-// Copies the lower triangle of the first `size` rows and columns to the upper one.
+namespace detail {
+
+// Four columns from `column` on.
 template <typename Derived>
-void mirror(Eigen::MatrixBase<Derived>& matrix, int size) {
+void mirror_columns(Eigen::MatrixBase<Derived>& matrix, int column) {
   static_assert(Derived::RowsAtCompileTime % 4 == 0, "whole packets");
-  using Scalar = typename Derived::Scalar;
-  constexpr int kStride = Derived::RowsAtCompileTime;
-  Scalar* p = &matrix.derived().coeffRef(0, 0);
-  for (int j = 0; j < size; j += 4) {
-    Scalar* own = p + j * kStride + j;  // block on the diagonal
-    for (int c = 1; c < 4; ++c) {
-      for (int r = 0; r < c; ++r) own[c * kStride + r] = own[r * kStride + c];
-    }
-    for (int i = j + 4; i < size; i += 4) {
-      const Scalar* lower = p + j * kStride + i;
-      Scalar* upper = p + i * kStride + j;
-      Packet<Scalar> x0(lower), x1(lower + kStride), x2(lower + 2 * kStride),
-          x3(lower + 3 * kStride);
-      Packet<Scalar>::transpose(x0, x1, x2, x3);
-      x0.store(upper);
-      x1.store(upper + kStride);
-      x2.store(upper + 2 * kStride);
-      x3.store(upper + 3 * kStride);
-    }
+  using P = Packet<typename Derived::Scalar>;
+  const auto all = columns(matrix.derived());
+  const auto to = all.from_column(column);
+  for (int row = 0; row < column; row += 4) {
+    const auto lower = all.from_column(row).from(column), upper = to.from(row);
+    P x0(lower[0]), x1(lower[1]), x2(lower[2]), x3(lower[3]);
+    P::transpose(x0, x1, x2, x3);
+    x0.store(upper[0]), x1.store(upper[1]), x2.store(upper[2]), x3.store(upper[3]);
   }
+  const auto own = to.from(column);  // the block on the diagonal
+  P x0(own[0]), x1(own[1]), x2(own[2]), x3(own[3]);
+  const P below1 = x1, below2 = x2, below3 = x3;
+  P::transpose(x0, x1, x2, x3);
+  P::template first<1>(x1, below1).store(own[1]);
+  P::template first<2>(x2, below2).store(own[2]);
+  P::template first<3>(x3, below3).store(own[3]);
+}
+
+}  // namespace detail
+
+// Copies the lower triangle to the upper one in the columns from `begin` to `end`, multiples of
+// four.
+template <typename Derived>
+void mirror(Eigen::MatrixBase<Derived>& matrix, int begin, int end) {
+  for (int column = begin; column < end; column += 4) detail::mirror_columns(matrix, column);
 }
 
 // Of `packets` sums so many at once that none waits for its last addition, and all stay in
 // registers: there is a factor besides, and a number from memory.
 template <typename Scalar>
-constexpr int packets_at_once(int packets) {
-  const int most = Packet<Scalar>::kHeld + 1;
+constexpr int packets_at_once(int packets, int rows = 1) {
+  const int most = rows == 1 ? Packet<Scalar>::kHeld + 1 : Packet<Scalar>::kHeld / rows;
   const int groups = (packets - 1) / most + 1;
   return (packets + groups - 1) / groups;
 }
@@ -98,51 +126,39 @@ class Sum {
   int count_ = 0;
 };
 
-// P h for an h of `blocks` blocks of three numbers, for the columns of P from at[b] on. From one
-// number of h to the next it is `Step`, from one block to the next `BlockStep`.
-template <int Step, int BlockStep, int First = 0, typename Derived>
+// P h of `Rows` vectors h of `blocks` blocks of three numbers, for the columns of P from at[b] on.
+// From one h to the next it is one number, to the next number of h `Step`, to the next block
+// `BlockStep`; the results are as far apart as columns of P. What is loaded of P serves all.
+template <int Rows, int Step, int BlockStep, int First = 0, typename Derived>
 void multiply_blocks(const Eigen::MatrixBase<Derived>& p, const int* at,
                      const typename Derived::Scalar* h, int blocks, typename Derived::Scalar* out) {
   using Scalar = typename Derived::Scalar;
   constexpr int kStride = Derived::RowsAtCompileTime;
   constexpr int kPackets = kStride / 4;
-  constexpr int kHere = std::min(packets_at_once<Scalar>(kPackets), kPackets - First);
-  Packet<Scalar> sum[kHere];
+  constexpr int kHere = std::min(packets_at_once<Scalar>(kPackets, Rows), kPackets - First);
+  Packet<Scalar> sum[Rows][kHere];
   for (int b = 0; b < blocks; ++b) {
-    const Scalar* factor = h + b * BlockStep;
+    const Scalar* factors = h + b * BlockStep;
     const Scalar* column = &p.derived().coeffRef(4 * First, at[b]);
 #pragma GCC unroll 3
-    for (int i = 0; i < 3; ++i, factor += Step, column += kStride) {
+    for (int i = 0; i < 3; ++i, factors += Step, column += kStride) {
 #pragma GCC unroll 13
-      for (int k = 0; k < kHere; ++k) sum[k].add(*factor, Packet<Scalar>(column + 4 * k));
+      for (int k = 0; k < kHere; ++k) {
+        Packet<Scalar> x(column + 4 * k);
+        if constexpr (Rows > 1) x.hold();
+#pragma GCC unroll 2
+        for (int r = 0; r < Rows; ++r) sum[r][k].add(factors[r], x);
+      }
     }
   }
+#pragma GCC unroll 2
+  for (int r = 0; r < Rows; ++r) {
 #pragma GCC unroll 13
-  for (int k = 0; k < kHere; ++k) sum[k].store(out + 4 * (First + k));
-  if constexpr (First + kHere < kPackets) {
-    multiply_blocks<Step, BlockStep, First + kHere>(p, at, h, blocks, out);
+    for (int k = 0; k < kHere; ++k) sum[r][k].store(out + r * kStride + 4 * (First + k));
   }
-}
-
-// Columns of numbers in memory, `Stride` apart.
-template <typename Scalar, int Stride>
-struct Columns {
-  Scalar* first;
-
-  Columns from(int row) const { return {first + row}; }
-  Columns from_column(int column) const { return {first + column * Stride}; }
-  Scalar* operator[](int column) const { return first + column * Stride; }
-};
-
-// Of a matrix, or of a block of whole columns or rows.
-template <typename Derived>
-auto columns(Eigen::PlainObjectBase<Derived>& m) {
-  return Columns<typename Derived::Scalar, Derived::OuterStrideAtCompileTime>{m.data()};
-}
-template <typename Derived>
-auto columns(const Eigen::MatrixBase<Derived>& m) {
-  return Columns<const typename Derived::Scalar, Derived::OuterStrideAtCompileTime>{
-      m.derived().data()};
+  if constexpr (First + kHere < kPackets) {
+    multiply_blocks<Rows, Step, BlockStep, First + kHere>(p, at, h, blocks, out);
+  }
 }
 
 namespace detail {

@@ -3,8 +3,10 @@
 //
 // Mean:  X = (R, v, p, q_2 .. q_5, w_2 .. w_5) in SE_10(3) with R body to world, v and p those of
 //        the IMU, q_i the centre of endcap i and w_i its velocity; Euclidean part
-//        theta = (b_g, b_a, o, m) with o the constant errors of the cable sensors and m = (height,
-//        slope x, slope y) of the ground plane z = m_0 + m_1 x + m_2 y.
+//        theta = (b_g, b_a, m, o) with m = (height, slope x, slope y) of the ground plane
+//        z = m_0 + m_1 x + m_2 y, and o the constant errors of the cable sensors, which come
+//        last because only cables look at them: above the diagonal the filter keeps up no more of
+//        P than the columns before them.
 // Error: right-invariant, Xbar X^-1 = exp(xi) and thetabar - theta.
 //
 // A net of rods and cables measures distances only. In this error the distance of two endcaps does
@@ -17,6 +19,7 @@
 #include "tensegrity/inekf/column_covariance.hpp"
 #include "tensegrity/inekf/retraction.hpp"
 #include "tensegrity/math/so3.hpp"
+#include "tensegrity/math/symmetric.hpp"
 #include "tensegrity/robot/prism.hpp"
 
 namespace tensegrity::tight {
@@ -30,10 +33,12 @@ struct Belief : inekf::BodyError {
   // Where the error's further blocks start.
   static constexpr int kEndcaps = kBodyEnd;
   static constexpr int kRates = 27;
-  static constexpr int kOffsets = 39;
-  static constexpr int kGround = 48;
+  static constexpr int kGround = 39;
+  static constexpr int kOffsets = 42;
   // 51 states, and one that is always zero: columns of P are then whole SIMD packets.
   static constexpr int Dim = 52;
+  // So many columns of P are kept complete; of those after them only what is below the diagonal.
+  static constexpr int kComplete = padded(kOffsets);
   // Columns of the group: v, p, q_2 .. q_5, w_2 .. w_5.
   static constexpr int kColumns = 10;
   static constexpr int column_index(int column) {
@@ -111,6 +116,14 @@ struct Belief : inekf::BodyError {
     return rotation.allFinite() && columns.allFinite() && gyro_bias.allFinite() &&
            accel_bias.allFinite() && offsets.allFinite() && ground.allFinite() &&
            covariance.allFinite();
+  }
+
+  // Makes the whole of P symmetric.
+  void complete() { mirror(covariance, 0, Dim); }
+  Covariance complete_covariance() const {
+    Covariance p = covariance;
+    mirror(p, 0, Dim);
+    return p;
   }
 
   // Covariances of errors in the world frame: of a column x it is xi_x + xi_R x x.

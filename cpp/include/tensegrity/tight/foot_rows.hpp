@@ -2,6 +2,7 @@
 // a vector are one packet.
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "tensegrity/math/symmetric.hpp"
@@ -9,42 +10,43 @@
 
 namespace tensegrity::tight {
 
-// Rows 0 to 2 are of the slip, the last of them across the ground; row 3 is of the height.
+// Rows 0 to 2 are of the slip, the last of them across the ground; row 3 is of the height. Every
+// block has to be set before they are used.
 template <typename Scalar>
 class FootRows {
  public:
   using P = Packet<Scalar>;
   static constexpr int kBlocks = 3;  // of the slip, and of the height
 
-  FootRows() { set_zero(slip_.data(), slip_.data() + slip_.size()); }
-
-  // Columns at .. at + 2 of the slip's rows: vectors of three. Blocks in which the one across the
-  // ground is zero come last.
-  void add_slip(int at, P first, P second) { add_slip(at, first, second, P()); }
-  void add_slip(int at, P first, P second, P across) {
-    P fourth;
-    P::transpose(first, second, across, fourth);
-    slip_at_[std::size_t(blocks_)] = at;
-    first.store(&slip_(0, 3 * blocks_));
-    second.store(&slip_(0, 3 * blocks_ + 1));
-    across.store(&slip_(0, 3 * blocks_ + 2));
-    ++blocks_;
+  // Columns at .. at + 2 of the slip's rows, each with a number for each row and a zero.
+  void set_slip(int block, int at, const P& x, const P& y, const P& z) {
+    slip_at_[std::size_t(block)] = at;
+    x.store(&slip_(0, 3 * block));
+    y.store(&slip_(0, 3 * block + 1));
+    z.store(&slip_(0, 3 * block + 2));
   }
-  // All of them are set.
-  void set_height(int block, int at, P h) {
+  // Columns at .. at + 2 of the height's row, and a zero.
+  void set_height(int block, int at, const P& h) {
     height_at_[std::size_t(block)] = at;
-    h.clear_fourth();
     h.store(height_[block]);
   }
-  void limit_across(int blocks) { across_ = blocks; }
+  // Only the first `blocks` of the slip's are not zero, and of the row across the ground the first
+  // `across`.
+  void limit(int blocks, int across) { blocks_ = blocks, across_ = across; }
 
-  // P H', of one row.
-  void cross(int row, const typename Belief<Scalar>::Covariance& p, Scalar* out) const {
-    if (row == 3) {
-      multiply_blocks<1, 4>(p, height_at_.data(), height_[0], kBlocks, out);
-    } else {
-      multiply_blocks<4, 12>(p, slip_at_.data(), &slip_(row, 0), row < 2 ? blocks_ : across_, out);
-    }
+  // Rows that say nothing, of columns that are set.
+  void clear() {
+    slip_.setZero();
+    for (auto& block : height_) std::fill(block, block + 4, Scalar(0));
+  }
+
+  // P H', four columns.
+  void cross(const typename Belief<Scalar>::Covariance& p, Scalar* out) const {
+    constexpr int kColumn = Belief<Scalar>::Dim;
+    const int* slip_at = slip_at_.data();
+    multiply_blocks<2, 4, 12>(p, slip_at, &slip_(0, 0), blocks_, out);
+    multiply_blocks<1, 4, 12>(p, slip_at, &slip_(2, 0), across_, out + 2 * kColumn);
+    multiply_blocks<1, 1, 4>(p, height_at_.data(), height_[0], kBlocks, out + 3 * kColumn);
   }
   // H x of four vectors x, `stride` apart.
   void times(const Scalar* x, P* out, int stride) const {
@@ -75,8 +77,8 @@ class FootRows {
  private:
   Matrix<Scalar, 4, 3 * kBlocks> slip_;
   alignas(4 * sizeof(Scalar)) Scalar height_[kBlocks][4];
-  std::array<int, kBlocks> slip_at_{}, height_at_{};
-  int blocks_ = 0, across_ = 1;
+  std::array<int, kBlocks> slip_at_, height_at_;
+  int blocks_, across_;
 };
 
 }  // namespace tensegrity::tight

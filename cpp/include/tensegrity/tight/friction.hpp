@@ -27,8 +27,12 @@
 // balance of friction and leave it as uncertain as it is.
 #pragma once
 
+#include <array>
+#include <cmath>
+#include <limits>
+
 #include "tensegrity/tight/feet.hpp"
-#include "tensegrity/tight/sequential_update.hpp"
+#include "tensegrity/tight/feet_update.hpp"
 
 namespace tensegrity::tight {
 
@@ -54,39 +58,63 @@ struct FootResult {
   Scalar height_chi_square;  // one degree of freedom
 };
 
-// One foot on the ground for `dt` [s]. `spin` as in feet.hpp.
+// The feet on the ground for `dt` [s], up to Feet::kMost of them, and what each said. Feet whose
+// numbers are not finite are left out; chi_square of those, and of all if nothing could be
+// corrected, is NaN.
 //
 // How much a foot is believed to touch at all grows with the square of its share, up to a third:
 // the foot that is about to lift off carries little, and holding it down would bend the shape.
 template <typename Scalar>
-FootResult<Scalar> correct_foot(SequentialUpdate<Scalar>& update, const Belief<Scalar>& belief,
-                                const Ground<Scalar>& ground, int endcap, Scalar share,
-                                const Prism<Scalar>& robot, const FootNoise<Scalar>& noise,
-                                Scalar dt, Scalar spin = std::numeric_limits<Scalar>::quiet_NaN()) {
+std::array<FootResult<Scalar>, Feet<Scalar>::kMost> correct_feet(
+    Belief<Scalar>& belief, const Foot<Scalar>* on_ground, int count, const Prism<Scalar>& robot,
+    const FootNoise<Scalar>& noise, Scalar dt) {
   using P = Packet<Scalar>;
-  const P& normal = ground.normal;
-  const Foot<Scalar> foot(belief, ground, endcap, robot.endcap_radius, robot.rod_length, spin);
-  const Scalar rise = P::dot(normal, foot.slip());
-  P slip = foot.slip();
-  slip.subtract(rise, normal);
-  const Scalar speed = std::sqrt(P::dot(slip, slip));
-  const P along = speed > Scalar(1e-6) ? (1 / speed) * slip : ground.across_y;
-  const P across = P::cross(normal, along);
+  using V = VectorLanes<Scalar>;
+  std::array<FootResult<Scalar>, Feet<Scalar>::kMost> results{};
+  if (count == 0) return results;
+  const Ground<Scalar> ground(belief);
+  const Feet<Scalar> feet(belief, ground, on_ground, count, robot.endcap_radius, robot.rod_length);
+  const V& normal = feet.normal();
+  const P rise = V::dot(normal, feet.slip());
+  const V slip = feet.slip() - rise * normal;
+  const P speed = P::sqrt(V::dot(slip, slip));
+  const V along =
+      V::where_greater(speed, Scalar(1e-6), (1 / speed) * slip, V::all(ground.across_y));
+  const V across = V::cross(normal, along);
 
-  const Scalar variance = (noise.creep * noise.creep +
-                           noise.slip_length * speed / std::max(share, Scalar(kLeastShare))) /
-                          dt;
+  alignas(4 * sizeof(Scalar)) Scalar shares[4]{};
+  for (int k = 0; k < count; ++k) shares[k] = on_ground[k].share;
+  const P share(shares), one = P::all(1);
+  const auto at_least = [](const P& x, Scalar least) {
+    return P::where_greater(x, least, x, P::all(least));
+  };
+  P variance = P::all(noise.creep * noise.creep / dt);
+  variance.add((noise.slip_length / dt) / at_least(share, Scalar(kLeastShare)), speed);
   // t = (n n.z - e_z) / (mu n.z), of which n has no part in the directions along the ground.
-  const Scalar downhill = -1 / (noise.friction * normal.at(2));
-  const Scalar belief_in_contact = std::min(std::max(3 * share, Scalar(0.005)), Scalar(1));
-  const Scalar distrust = 1 / (dt * belief_in_contact * belief_in_contact);
-  const P chi_squares = update.correct(
-      foot.rows(across, along),
-      {-speed * downhill * across.at(2), speed * (1 - downhill * along.at(2)), rise, foot.height()},
-      {variance, variance, noise.rise * noise.rise * distrust,
-       noise.height * noise.height * distrust},
-      {Scalar(1), noise.slip_speed / (noise.slip_speed + speed), Scalar(1), Scalar(1)});
-  return {speed, foot.height(), chi_squares.at(3)};
+  const Scalar downhill = -1 / (noise.friction * ground.normal.z());
+  P in_contact = at_least(3 * share, Scalar(0.005));
+  in_contact = P::where_greater(in_contact, Scalar(1), one, in_contact);
+  const P distrust = 1 / (dt * (in_contact * in_contact));
+
+  FeetUpdate<Scalar> update;
+  feet.rows(across, along, update.rows());
+  P pull = speed;
+  pull.subtract(downhill * along.z, speed);
+  update.set_residuals((-downhill * across.z) * speed, pull, rise, feet.height());
+  update.set_variances(variance, variance, noise.rise * noise.rise * distrust,
+                       noise.height * noise.height * distrust);
+  update.set_information(one, noise.slip_speed / (P::all(noise.slip_speed) + speed), one, one);
+  const auto finite = [&](int k) { return std::isfinite(speed.at(k) + feet.height().at(k)); };
+  for (int k = 0; k < count; ++k) {
+    if (!finite(k)) update.silence(k);
+  }
+  const bool corrected = update.apply(belief, count);
+  for (int k = 0; k < count; ++k) {
+    results[std::size_t(k)] = {speed.at(k), feet.height().at(k),
+                               corrected && finite(k) ? update.chi_square(4 * k + 3)
+                                                      : std::numeric_limits<Scalar>::quiet_NaN()};
+  }
+  return results;
 }
 
 }  // namespace tensegrity::tight

@@ -36,6 +36,7 @@ void place_endcaps(Belief<Scalar>& belief, const Endcaps<Scalar>& h, Scalar posi
     belief.columns.col(i + 4) = belief.velocity() + rotation * belief.rate.cross(V3(h.col(i)));
     gyro_to[std::size_t(i - 2)] = rotation * hat(h.col(i));
   }
+  belief.complete();
   auto& p = belief.covariance;
   // Rows of the endcaps from those of the base rod, then the same for their columns.
   const auto derive = [&](auto&& m) {

@@ -42,7 +42,7 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   for (int c = 2; c < B::kColumns; ++c) {
     errors.set_group(B::column_index(c), body.column_by_gyro(Packet<Scalar>(x.col(c))));
   }
-  errors.apply(p, B::kOffsets, B::Dim);
+  errors.apply(p, B::kGround, B::Dim);
 
   // ---- walks of the step
   const auto walk = [&](int at, int size, Scalar std) {
@@ -63,7 +63,7 @@ void propagate(Belief<Scalar>& belief, const inekf::ImuSample<Scalar>& imu, Scal
   tilt << -x(0, 1), -x(1, 1), 1, 0, 0, 1;
   p.template block<3, 3>(B::kGround, B::kGround) +=
       (noise.ground_slope * noise.ground_slope * dt) * tilt.lazyProduct(tilt.transpose());
-  mirror(p, B::Dim);
+  mirror(p, 0, B::kComplete);
 }
 
 }  // namespace tensegrity::tight

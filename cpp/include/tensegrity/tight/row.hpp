@@ -2,6 +2,7 @@
 // endcaps and its offset, a foot one rod.
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "tensegrity/math/symmetric.hpp"
@@ -30,9 +31,15 @@ class Row {
     single_ = h;
   }
 
+  // Columns from here on are zero.
+  int end() const {
+    int end = single_at_ + 1;
+    for (int k = 0; k < blocks_; ++k) end = std::max(end, at_[std::size_t(k)] + 3);
+    return end;
+  }
   // P H'
   void cross(const typename Belief<Scalar>::Covariance& p, Scalar* out) const {
-    multiply_blocks<1, 3>(p, at_.data(), h_[0].data(), blocks_, out);
+    multiply_blocks<1, 1, 3>(p, at_.data(), h_[0].data(), blocks_, out);
     if (single_at_ < 0) return;
     for (int i = 0; i < Belief<Scalar>::Dim; i += 4) {
       Packet<Scalar> sum(out + i);
