@@ -50,6 +50,11 @@ class FeetUpdate {
         for (int c = 0; c < 4; ++c) seen[c].store(&waiting_.g(4 * f, k + c));
       }
     }
+    // What is computed along with rows that are not used: of anything it might take long.
+    for (int k = 0; k < 4 * count; ++k) {
+      Scalar* column = &waiting_.g(0, k);
+      set_zero(column + 4 * count, column + kRows);
+    }
     eliminate_from<0>(4 * count);
     P chi_squares;
     for (int f = 0; f < count; ++f) {
