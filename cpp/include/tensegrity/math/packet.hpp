@@ -17,6 +17,14 @@
 #define TENSEGRITY_FLATTEN
 #endif
 
+// Before a function that is large and called once: what it returns stays in registers. Where there
+// are none for that the compiler decides.
+#ifdef EIGEN_VECTORIZE
+#define TENSEGRITY_INLINE EIGEN_ALWAYS_INLINE
+#else
+#define TENSEGRITY_INLINE inline
+#endif
+
 namespace tensegrity {
 
 // The next multiple of four.

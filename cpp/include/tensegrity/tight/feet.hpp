@@ -62,8 +62,8 @@ class Feet {
 
   // Of `count` feet, from one to kMost. `belief` and `ground`, that of the belief, have to outlive
   // this.
-  EIGEN_ALWAYS_INLINE Feet(const B& belief, const Ground<Scalar>& ground, const Foot<Scalar>* feet,
-                           int count, Scalar radius, Scalar rod_length)
+  TENSEGRITY_INLINE Feet(const B& belief, const Ground<Scalar>& ground, const Foot<Scalar>* feet,
+                         int count, Scalar radius, Scalar rod_length)
       : belief_(belief),
         ground_(ground),
         normal_(V::all(ground.normal)),
@@ -102,7 +102,7 @@ class Feet {
   const P& height() const { return height_; }
 
   // Rows of slip . first, slip . second, slip . n and of the height, of kMost feet.
-  EIGEN_ALWAYS_INLINE void rows(const V& first, const V& second, FootRows<Scalar>* out) const {
+  TENSEGRITY_INLINE void rows(const V& first, const V& second, FootRows<Scalar>* out) const {
     const P zero;
     const V none{};
     // Of its own velocity a free rod's turn takes r/L ((u . n) d - (u . d) n), of the other's as
@@ -154,7 +154,7 @@ class Feet {
     P offset;            // b_i, body, of the base rod
     Scalar base, by_spin, spin;
   };
-  EIGEN_ALWAYS_INLINE Motion motion(const Foot<Scalar>& foot) const {
+  TENSEGRITY_INLINE Motion motion(const Foot<Scalar>& foot) const {
     const int own = foot.endcap, other = own ^ 1;
     // Their fourth numbers do not matter.
     const auto packet = [](const auto& v) { return P(v[0], v[1], v[2], v[2]); };
@@ -189,8 +189,8 @@ class Feet {
   V in_body(const V& v) const { return V::transposed_times(belief_.rotation, v); }
 
   // A block of three columns of the slip's rows.
-  EIGEN_ALWAYS_INLINE void set_slip(FootRows<Scalar>* out, int block, const V& first,
-                                    const V& second, const V& across) const {
+  TENSEGRITY_INLINE void set_slip(FootRows<Scalar>* out, int block, const V& first, const V& second,
+                                  const V& across) const {
     P x[4] = {first.x, second.x, across.x, P()};
     P y[4] = {first.y, second.y, across.y, P()};
     P z[4] = {first.z, second.z, across.z, P()};

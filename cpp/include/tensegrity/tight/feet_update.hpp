@@ -106,8 +106,7 @@ class FeetUpdate {
 #pragma GCC unroll 3
     for (int i = From; i < kRows; i += 4) rest[(i - From) / 4] = P(&ld(i, j));
     Scalar pivot = ld(j, j) + variance_[j], right = right_[j];
-#pragma GCC unroll 12
-    for (int k = 0; k < j; ++k) {
+    const auto take = [&](int k) {
       const Scalar seen = ld(j, k), factor = seen * inverse_[k];
       pivot -= factor * seen;
       right -= factor * right_[k];
@@ -115,6 +114,13 @@ class FeetUpdate {
       for (int i = From; i < kRows; i += 4) {
         rest[(i - From) / 4].subtract(factor, P(&ld(i, k)));
       }
+    };
+    if constexpr (P::kSimd) {
+#pragma GCC unroll 12
+      for (int k = 0; k < j; ++k) take(k);
+    } else {
+#pragma GCC unroll 1
+      for (int k = 0; k < j; ++k) take(k);
     }
     inverse_[j] = 1 / std::max(pivot, variance_[j]);  // rounding may have left less
     right_[j] = right;
