@@ -58,7 +58,7 @@ class Feet {
   using B = Belief<Scalar>;
   using P = Packet<Scalar>;
   using V = VectorLanes<Scalar>;
-  static constexpr int kMost = 3;
+  static constexpr int kMost = kMostFeet;
 
   // Of `count` feet, from one to kMost. `belief` and `ground`, that of the belief, have to outlive
   // this.

@@ -18,7 +18,7 @@ class FeetUpdate {
  public:
   using B = Belief<Scalar>;
   using P = Packet<Scalar>;
-  static constexpr int kFeet = 3;
+  static constexpr int kFeet = kMostFeet;
 
   // To be filled: the rows of every foot, and for each of their four rows a number for every foot.
   FootRows<Scalar>* rows() { return rows_; }
@@ -75,6 +75,7 @@ class FeetUpdate {
 
  private:
   static constexpr int kRows = 4 * kFeet;
+  static_assert(kRows == WaitingRows<Scalar>::kCapacity);
 
   static void store_by_foot(P across, P along, P rise, P height, Scalar* out) {
     static_assert(kFeet == 3);

@@ -10,6 +10,8 @@
 
 namespace tensegrity::tight {
 
+inline constexpr int kMostFeet = 3;  // that carry the robot at once
+
 // Rows 0 to 2 are of the slip, the last of them across the ground; row 3 is of the height. Every
 // block has to be set before they are used.
 template <typename Scalar>
