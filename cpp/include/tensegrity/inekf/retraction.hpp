@@ -30,28 +30,18 @@ class Retraction {
   }
 
   void move(Matrix3<Scalar>& rotation) const {
-    store_block(orthonormalized(Block<Scalar>{turned(rotation.col(0)), turned(rotation.col(1)),
-                                              turned(rotation.col(2))}),
+    store_block(orthonormalized(Block<Scalar>{multiply(turn_, rotation.col(0)),
+                                              multiply(turn_, rotation.col(1)),
+                                              multiply(turn_, rotation.col(2))}),
                 rotation);
   }
   // A column x of the group and its error.
   template <typename Column>
   void move(Column&& column, const Scalar* error) const {
-    P back = error[0] * shift_[0];
-    back.add(error[1], shift_[1]);
-    back.add(error[2], shift_[2]);
-    (turned(column) - back).store_vector(column);
+    (multiply(turn_, column) - multiply(shift_, error)).store_vector(column);
   }
 
  private:
-  template <typename Column>
-  P turned(const Column& x) const {
-    P sum = x[0] * turn_[0];
-    sum.add(x[1], turn_[1]);
-    sum.add(x[2], turn_[2]);
-    return sum;
-  }
-
   Block<Scalar> turn_, shift_;  // Gamma_0, Gamma_1
 };
 

@@ -59,12 +59,6 @@ Strapdown<Scalar> integrate(Matrix3<Scalar>& rotation, Velocity&& velocity, Posi
   const Scalar dt2 = dt * dt, dt3 = dt2 * dt;
 
   const Block<Scalar> r = to_block(rotation);
-  const auto turned = [&](const Block<Scalar>& m, const V3& v) {
-    P sum = v[0] * m[0];
-    sum.add(v[1], m[1]);
-    sum.add(v[2], m[2]);
-    return sum;
-  };
   const auto combine = [](Scalar f, const P& u, Scalar g, const P& v, Scalar h, const P& w) {
     P sum = f * u;
     sum.add(g, v);
@@ -78,7 +72,7 @@ Strapdown<Scalar> integrate(Matrix3<Scalar>& rotation, Velocity&& velocity, Posi
     product.subtract(v[(j + 1) % 3], r[std::size_t(j + 2) % 3]);
     return product;
   };
-  const P y = turned(r, x), force = turned(r, a);
+  const P y = multiply(r, x), force = multiply(r, a);
   const P y2 = c.c2 * y, dt_y3 = dt * c.c3 * y, dt2_y4 = dt2 * c.c4 * y;
   Strapdown<Scalar> s;
   Block<Scalar> next, r_g2;  // R Gamma_0, R Gamma_2 dt^2
@@ -92,8 +86,8 @@ Strapdown<Scalar> integrate(Matrix3<Scalar>& rotation, Velocity&& velocity, Posi
   }
   const P g = -gravity * P::constant(0, 0, 1, 0);
   const P start_velocity(velocity);
-  const P moved = P(position) + (dt * start_velocity + (turned(r_g2, a) + dt2 / 2 * g));
-  const P faster = start_velocity + (turned(s.int_r, a) + dt * g);
+  const P moved = P(position) + (dt * start_velocity + (multiply(r_g2, a) + dt2 / 2 * g));
+  const P faster = start_velocity + (multiply(s.int_r, a) + dt * g);
   moved.store_vector(position);
   faster.store_vector(velocity);
 

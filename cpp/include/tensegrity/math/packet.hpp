@@ -317,6 +317,15 @@ void store_block(const Block<Scalar>& block, Eigen::Matrix<Scalar, 3, 3>& m) {
   }
 }
 
+// M x, with x any three numbers.
+template <typename Scalar, typename Three>
+Packet<Scalar> multiply(const Block<Scalar>& m, const Three& x) {
+  Packet<Scalar> sum = x[0] * m[0];
+  sum.add(x[1], m[1]);
+  sum.add(x[2], m[2]);
+  return sum;
+}
+
 // Zeros in the packets from `rows` to `end`. GCC would call memset for them, which takes longer for
 // arrays as short as these.
 template <typename Scalar>

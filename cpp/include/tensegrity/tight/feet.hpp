@@ -170,22 +170,16 @@ class Feet {
                                     packet(belief_.rotation.col(2))};
     const Vector3<Scalar>& b = belief_.base[std::size_t(own)];
     const Vector3<Scalar> along = b - belief_.base[std::size_t(other)];
-    return {column(1) + times(rotation, b),
-            column(0) + times(rotation, belief_.rate.cross(b)),
-            times(rotation, along),
-            times(rotation, belief_.rate.cross(along)),
+    return {column(1) + multiply(rotation, b),
+            column(0) + multiply(rotation, belief_.rate.cross(b)),
+            multiply(rotation, along),
+            multiply(rotation, belief_.rate.cross(along)),
             packet(b),
             Scalar(1),
             Scalar(0),
             Scalar(0)};
   }
 
-  static P times(const Block<Scalar>& m, const Vector3<Scalar>& x) {
-    P sum = x[0] * m[0];
-    sum.add(x[1], m[1]);
-    sum.add(x[2], m[2]);
-    return sum;
-  }
   V in_body(const V& v) const { return V::transposed_times(belief_.rotation, v); }
 
   // A block of three columns of the slip's rows.
