@@ -177,7 +177,7 @@ TEST_CASE("feet: each row informs by its own part") {
     return belief;
   };
   const B all = corrected();
-  m.information << 0.3, 1, 0, 0.8, 1, 0.1, 1, 1, 0, 0.5, 0.9, 1;
+  m.information << 0.3, 1, 1e-6, 0.8, 1, 0.1, 1, 1, 0.01, 0.5, 0.9, 1;
   MatrixXd expected = prior.covariance;
   B before = prior;
   for (int k = 0; k < 4 * m.count; ++k) {  // one after the other, each given those before it
@@ -187,7 +187,7 @@ TEST_CASE("feet: each row informs by its own part") {
     before.covariance = after.covariance;
   }
   const B part = corrected();
-  CHECK(part.columns == all.columns);
+  CHECK(distance(part.columns, all.columns) < 1e-12);
   CHECK(distance(part.complete_covariance(), expected) < 1e-12);
 }
 
@@ -269,23 +269,4 @@ TEST_CASE("a row beyond its gate, or not finite, changes nothing") {
     CHECK(update.correct(m.row, 10, m.variance, 1.001 * chi_square) == chi_square);
   }
   CHECK((belief.covariance - prior.covariance).norm() > 0);
-}
-
-TEST_CASE("information scales the downdate of P, and leaves the mean's step whole") {
-  const Prism<double> robot;
-  Samples samples(6);
-  const B prior = samples.belief(robot);
-  const Measurement m = any_measurement(samples);
-  const auto corrected = [&](double information) {
-    B belief = prior;
-    SequentialUpdate<double>(belief).correct(m.row, m.residual, m.variance, 0.0, information);
-    return belief;
-  };
-  const B all = corrected(1), none = corrected(0), part = corrected(0.3);
-  CHECK(difference(all, prior).norm() > 0);
-  CHECK(none.columns == all.columns);
-  CHECK(part.columns == all.columns);
-  CHECK(none.complete_covariance() == prior.covariance);
-  const MatrixXd expected = prior.covariance + 0.3 * (all.complete_covariance() - prior.covariance);
-  CHECK(distance(part.complete_covariance(), expected) < 1e-14);
 }

@@ -163,12 +163,12 @@ void multiply_blocks(const Eigen::MatrixBase<Derived>& p, const int* at,
 
 namespace detail {
 
-// Four columns of P, `Packets` packets of rows: P <- P +- A B' with `count` > 0 columns of A
+// Four columns of P, `Packets` packets of rows: P <- P - A B' with `count` > 0 columns of A
 // and B. What is loaded of A is used in every column, what is loaded of B in every packet, and the
 // tile stays in registers.
-template <int Packets, bool Subtract, typename Scalar, int P, int A, int B>
-void add_product_tile(Columns<Scalar, P> p, Columns<const Scalar, A> a, Columns<const Scalar, B> b,
-                      int count) {
+template <int Packets, typename Scalar, int P, int W>
+void subtract_tile(Columns<Scalar, P> p, Columns<const Scalar, W> a, Columns<const Scalar, W> b,
+                   int count) {
   Packet<Scalar> tile[4][Packets];
 #pragma GCC unroll 4
   for (int c = 0; c < 4; ++c) {
@@ -186,16 +186,10 @@ void add_product_tile(Columns<Scalar, P> p, Columns<const Scalar, A> a, Columns<
 #pragma GCC unroll 4
     for (int c = 0; c < 4; ++c) {
 #pragma GCC unroll 2
-      for (int k = 0; k < Packets; ++k) {
-        if constexpr (Subtract) {
-          tile[c][k].subtract(b.first[c], rows[k]);
-        } else {
-          tile[c][k].add(b.first[c], rows[k]);
-        }
-      }
+      for (int k = 0; k < Packets; ++k) tile[c][k].subtract(b.first[c], rows[k]);
     }
-    a.first += A;
-    b.first += B;
+    a.first += W;
+    b.first += W;
   } while (a.first != end);
 #pragma GCC unroll 4
   for (int c = 0; c < 4; ++c) {
@@ -204,23 +198,29 @@ void add_product_tile(Columns<Scalar, P> p, Columns<const Scalar, A> a, Columns<
   }
 }
 
-}  // namespace detail
-
-// Four columns of P from `first` to `end` (multiples of four): P <- P +- A B' with `count` columns
-// (> 0) of A, from the same rows, and of B, of which each has four numbers.
-template <bool Subtract, typename Scalar, int P, int A, int B>
-void add_product(Columns<Scalar, P> p, Columns<const Scalar, A> a, Columns<const Scalar, B> b,
-                 int count, int first, int end) {
-  int i = first;
-  if constexpr (Packet<Scalar>::kHeld >= 12) {
-    for (; i + 8 <= end; i += 8) {
-      detail::add_product_tile<2, Subtract>(p.from(i), a.from(i), b, count);
-    }
+// The same with one packet of rows, in two sums each: four chains of additions are too few at once.
+template <typename Scalar, int P, int W>
+void subtract_single(Columns<Scalar, P> p, Columns<const Scalar, W> a, Columns<const Scalar, W> b,
+                     int count) {
+  Packet<Scalar> even[4], odd[4];
+  const auto take = [](Packet<Scalar>(&sums)[4], Packet<Scalar> rows, const Scalar* factors) {
+    rows.hold();
+#pragma GCC unroll 4
+    for (int c = 0; c < 4; ++c) sums[c].subtract(factors[c], rows);
+  };
+#pragma GCC unroll 4
+  for (int c = 0; c < 4; ++c) even[c] = Packet<Scalar>(p[c]);
+  int k = 0;
+  for (; k + 2 <= count; k += 2) {
+    take(even, Packet<Scalar>(a[k]), b[k]);
+    take(odd, Packet<Scalar>(a[k + 1]), b[k + 1]);
   }
-  for (; i < end; i += 4) {
-    detail::add_product_tile<1, Subtract>(p.from(i), a.from(i), b, count);
-  }
+  if (k < count) take(even, Packet<Scalar>(a[k]), b[k]);
+#pragma GCC unroll 4
+  for (int c = 0; c < 4; ++c) (even[c] + odd[c]).store(p[c]);
 }
+
+}  // namespace detail
 
 // P <- P - W W' with the first `count` columns of W, in the lower triangle of the first `size` rows
 // and columns.
@@ -230,7 +230,18 @@ void subtract_outer(Eigen::MatrixBase<P>& p, const Eigen::MatrixBase<W>& w, int 
   const auto to = columns(p.derived());
   const auto from = columns(w);
   for (int j = 0; count > 0 && j < size; j += 4) {
-    add_product<true>(to.from_column(j), from, from.from(j), count, j, size);
+    const auto own = to.from_column(j);
+    int i = j;
+    if constexpr (Packet<typename P::Scalar>::kHeld >= 12) {
+      for (; i + 8 <= size; i += 8) {
+        detail::subtract_tile<2>(own.from(i), from.from(i), from.from(j), count);
+      }
+      if (i < size) detail::subtract_single(own.from(i), from.from(i), from.from(j), count);
+    } else {
+      for (; i < size; i += 4) {
+        detail::subtract_tile<1>(own.from(i), from.from(i), from.from(j), count);
+      }
+    }
   }
 }
 

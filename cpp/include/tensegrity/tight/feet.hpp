@@ -40,8 +40,9 @@ struct Ground {
       : height(belief.ground[0]),
         up(-belief.ground[1], -belief.ground[2], 1),
         steepness(std::sqrt(up.squaredNorm())),
-        normal(up / steepness),
-        across_y(V3(1, 0, belief.ground[1]) / std::sqrt(1 + belief.ground[1] * belief.ground[1])),
+        normal((1 / steepness) * up),
+        across_y((1 / std::sqrt(1 + belief.ground[1] * belief.ground[1])) *
+                 V3(1, 0, belief.ground[1])),
         base_rate(belief.rotation * belief.rate) {}
 
   Scalar height;     // m0

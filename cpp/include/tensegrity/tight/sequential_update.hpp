@@ -38,11 +38,8 @@ class SequentialUpdate {
   SequentialUpdate& operator=(const SequentialUpdate&) = delete;
 
   // residual = H e + n with var(n) = variance > 0. Returns y^2, the row's part of the chi-square;
-  // with it beyond `gate` (0: no gate) nothing happened. `information` in [0, 1] is the part of the
-  // downdate of P that is applied: 1 for a Gaussian measurement, less where the mean moves more
-  // than the data inform (robust likelihoods).
-  Scalar correct(const Row<Scalar>& row, Scalar residual, Scalar variance, Scalar gate = 0,
-                 Scalar information = 1) {
+  // with it beyond `gate` (0: no gate) nothing happened.
+  Scalar correct(const Row<Scalar>& row, Scalar residual, Scalar variance, Scalar gate = 0) {
     if (waiting_ == rows_.kCapacity) take();
     const int own = waiting_;
     for (; complete_ < row.end(); complete_ += 4) {
@@ -65,7 +62,7 @@ class SequentialUpdate {
     if (!std::isfinite(chi_square) || (gate > 0 && chi_square > gate)) return chi_square;
     const Scalar root = std::sqrt(inverse);
     // Also a row that informs of nothing stands in the joint gain.
-    rows_.set(own, root, innovation * root, information);
+    rows_.set(own, root, innovation * root);
     ++waiting_;
     return chi_square;
   }

@@ -4,8 +4,6 @@
 // C = P H' G^-T, the error C y, and P - C C': P is read and written once.
 #pragma once
 
-#include <cmath>
-
 #include "tensegrity/math/symmetric.hpp"
 #include "tensegrity/tight/belief.hpp"
 
@@ -19,11 +17,10 @@ struct WaitingRows {
 
   Scalar* cross(int row) { return &crosses(0, row); }
 
-  // `root`: 1 / the diagonal element of G. `part`: how much of the row's downdate is applied.
-  void set(int row, Scalar root, Scalar innovation, Scalar part) {
+  // `root`: 1 / the diagonal element of G.
+  void set(int row, Scalar root, Scalar innovation) {
     inverse[row] = root;
     y[row] = innovation;
-    information[row] = part;
   }
 
   // C of the first `count` rows, and what they say of the error is added to it.
@@ -31,23 +28,20 @@ struct WaitingRows {
     for (int k = count; k < padded(count); ++k) {  // rows that say nothing
       crosses.col(k).setZero();
       g.row(k).head(k).setZero();
-      set(k, Scalar(0), Scalar(0), Scalar(1));
+      set(k, Scalar(0), Scalar(0));
     }
     for (int j = 0; j < count; j += 4) whiten_four(j, error);
   }
   // After that: takes them out of P.
   void downdate(typename B::Covariance& covariance, int count) {
-    for (int k = 0; k < count; ++k) {
-      if (information[k] < 1) crosses.col(k) *= std::sqrt(information[k]);
-    }
     subtract(covariance, count);
     mirror(covariance, 0, B::kComplete);
   }
 
   Matrix<Scalar, B::Dim, kCapacity> crosses;  // P H', in the end C
   Matrix<Scalar, kCapacity> g;                // G below its diagonal
-  // By row: 1 / its diagonal element of G, y, and the part of the downdate that is applied.
-  alignas(4 * sizeof(Scalar)) Scalar inverse[kCapacity], y[kCapacity], information[kCapacity];
+  // By row: 1 / its diagonal element of G, and y.
+  alignas(4 * sizeof(Scalar)) Scalar inverse[kCapacity], y[kCapacity];
 
  private:
   TENSEGRITY_FLATTEN void subtract(typename B::Covariance& covariance, int count) {
