@@ -52,9 +52,11 @@ class FeetUpdate {
       }
     }
     // What is computed along with rows that are not used: of anything it might take long.
-    for (int k = 0; count < kFeet && k < 4 * count; ++k) {
-      Scalar* column = &waiting_.g(0, k);
-      set_zero(column + 4 * count, column + kRows);
+    if (count < kFeet) {
+      for (int k = 0; k < 4 * count; ++k) {
+        Scalar* column = &waiting_.g(0, k);
+        set_zero(column + 4 * count, column + kRows);
+      }
     }
     eliminate_from<0>(4 * count);
     P chi_squares;
