@@ -189,6 +189,13 @@ TEST_CASE("feet: each row informs by its own part") {
   const B part = corrected();
   CHECK(distance(part.columns, all.columns) < 1e-12);
   CHECK(distance(part.complete_covariance(), expected) < 1e-12);
+
+  m.information[8] = 0;  // not a part
+  B belief = prior;
+  FeetUpdate<double> update;
+  m.fill(update);
+  CHECK_FALSE(update.apply(belief, m.count));
+  check_unchanged(belief, prior);
 }
 
 TEST_CASE("feet: what is not finite changes nothing, a silent foot nothing of the others") {

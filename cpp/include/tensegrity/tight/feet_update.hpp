@@ -41,7 +41,7 @@ class FeetUpdate {
   }
 
   // With the first `count` of the feet; uses up what was filled in. False, and nothing happened, if
-  // that or P is not finite. P is symmetric (belief.hpp), and stays so.
+  // that or P is not finite, or a part is zero. P is symmetric (belief.hpp), and stays so.
   bool apply(B& belief, int count) {
     for (int f = 0; f < count; ++f) rows_[f].cross(belief.covariance, waiting_.cross(4 * f));
     for (int f = 0; f < count; ++f) {
@@ -59,9 +59,12 @@ class FeetUpdate {
       }
     }
     eliminate_from<0>(4 * count);
-    P chi_squares;
-    for (int f = 0; f < count; ++f) chi_squares = chi_squares + wait(4 * f);
-    if (!std::isfinite(P::dot(chi_squares, P::all(1)) + chi_squares.at(3))) return false;
+    P squares;
+    for (int f = 0; f < count; ++f) {
+      const P y = wait(4 * f);
+      squares = squares + y * y;
+    }
+    if (!std::isfinite(P::dot(squares, P::all(1)) + squares.at(3))) return false;
 
     typename B::ErrorVector error;
     set_zero(error.data(), error.data() + B::Dim);
@@ -141,13 +144,14 @@ class FeetUpdate {
 
   // Of the foot whose rows start at `j`: its columns of G, 1 / the diagonal of G, and y = G^-1 z.
   // Where a part s^2 of the downdate is applied, the columns of C shall be s times as long: those
-  // of G and y are 1 / s times that. Returns the parts of the chi-square.
+  // of G, and y, are divided by s. Returns y, which is not finite where s is zero.
   P wait(int j) {
     const P inverse(inverse_ + j), reduced(reduced_ + j);
     const P root = P::sqrt(inverse * P(information_ + j));
     const P by_root = inverse * (1 / root);
     root.store(waiting_.inverse + j);
-    (by_root * reduced).store(waiting_.y + j);
+    const P y = by_root * reduced;
+    y.store(waiting_.y + j);
     alignas(4 * sizeof(Scalar)) Scalar factors[4];
     by_root.store(factors);
 #pragma GCC unroll 4
@@ -157,7 +161,7 @@ class FeetUpdate {
         (factors[k - j] * P(&waiting_.g(i, k))).store(&waiting_.g(i, k));
       }
     }
-    return inverse * reduced * reduced;
+    return y;
   }
 
   FootRows<Scalar> rows_[kFeet];
