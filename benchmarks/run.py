@@ -56,11 +56,11 @@ COUNTING = (
     "--callgrind-out-file=/dev/null",
 )
 
-PROGRAMS = ("filter", "tight", "shape", "contact", "cycle", "dynamics", "unscented")
+COUNTED = ("filter", "tight", "shape", "contact", "dynamics", "unscented", "superball")
+PROGRAMS = (*COUNTED, "cycle")
 SHORT = ("filter", "tight", "shape", "contact")
 """Programs of calls of microseconds."""
 WITH_RECORDINGS = ("shape", "contact", "cycle")
-COUNTED = ("filter", "tight", "shape", "contact", "dynamics", "unscented")
 COUNTED_CYCLES = ("paper", "full")
 
 
