@@ -346,6 +346,7 @@ def page(results: Results) -> str:
         superball=p.superball(),
         scaling=p.scaling(),
         python=p.python(),
+        instruction_set=results.versions["Python module"],
         calls=p.calls(),
         peers=p.peers(),
         conditions=p.conditions().rstrip("\n"),

@@ -32,6 +32,7 @@ from callgrind import Counts, counts, worst_calls
 from results import Repetitions, Results, Timing, least_gauge, split
 
 import tensegrity.sequence
+from tensegrity import _core
 from tensegrity.simulation import SimulationOptions, simulate
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -241,6 +242,7 @@ def versions(where: Build, counting: Build) -> dict[str, str]:
         "Ipopt": debian("coinor-libipopt-dev"),
         "valgrind": debian("valgrind"),
         "Python": platform.python_version(),
+        "Python module": _core.instruction_set(),
         "numpy": version("numpy"),
     }
 

@@ -1,9 +1,13 @@
 #include "bindings.hpp"
 
-PYBIND11_MODULE(_core, m) {
+// Python knows it as tensegrity._core (loader.cpp).
+PYBIND11_MODULE(tensegrity_python, m) {
   using namespace tensegrity::bindings;
   m.doc() = "C++ core of tensegrity: shape reconstruction, invariant filter, estimators.";
   m.attr("__version__") = TENSEGRITY_VERSION;
+  m.def(
+      "instruction_set", [] { return TENSEGRITY_INSTRUCTION_SET; },
+      "What this core is compiled for: 'x86-64-v3' (AVX2 and FMA), 'native', or 'baseline'.");
   bind_robot(m);
   bind_shape(m);
   bind_inekf(m);

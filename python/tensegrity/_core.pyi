@@ -7,7 +7,7 @@ import enum
 import numpy
 import numpy.typing
 import typing
-__all__: list[str] = ['CalibrationStatus', 'Chirality', 'ConstraintSet', 'ContactDetector', 'ContactDetectorParameters', 'ContactNoise', 'ContactPoint', 'DWM1000_TICK_S', 'FilterForm', 'FilterNoise', 'ImuSampling', 'Integrator', 'InvariantFilter', 'IpoptShapeSolver', 'Madgwick', 'MadgwickSettings', 'Net', 'NetGround', 'NetSimulator', 'NetSimulatorFloat', 'PRISM_CABLES', 'Prism', 'PrismConfig', 'PrismEstimator', 'PrismHealth', 'PrismState', 'RangeCalibrationSolver', 'RangeLoss', 'RangingAnchors', 'RangingArrays', 'RangingConfig', 'RangingEstimator', 'RangingHealth', 'RangingProcessNoise', 'RangingRobot', 'RangingState', 'SPEED_OF_LIGHT', 'ShapeMethod', 'ShapeSolver', 'ShapeTracker', 'SigmaWeights', 'SpinMethod', 'Status', 'Terrain', 'UnscentedFilter', 'UnscentedSettings', 'cable_lengths', 'endcap_jacobian', 'fold', 'in_body_frame', 'inequality_values', 'length_jacobian', 'mutual_moments', 'spin_angle', 'two_way_ranges']
+__all__: list[str] = ['CalibrationStatus', 'Chirality', 'ConstraintSet', 'ContactDetector', 'ContactDetectorParameters', 'ContactNoise', 'ContactPoint', 'DWM1000_TICK_S', 'FilterForm', 'FilterNoise', 'ImuSampling', 'Integrator', 'InvariantFilter', 'IpoptShapeSolver', 'Madgwick', 'MadgwickSettings', 'Net', 'NetGround', 'NetSimulator', 'NetSimulatorFloat', 'PRISM_CABLES', 'Prism', 'PrismConfig', 'PrismEstimator', 'PrismHealth', 'PrismState', 'RangeCalibrationSolver', 'RangeLoss', 'RangingAnchors', 'RangingArrays', 'RangingConfig', 'RangingEstimator', 'RangingHealth', 'RangingProcessNoise', 'RangingRobot', 'RangingState', 'SPEED_OF_LIGHT', 'ShapeMethod', 'ShapeSolver', 'ShapeTracker', 'SigmaWeights', 'SpinMethod', 'Status', 'Terrain', 'UnscentedFilter', 'UnscentedSettings', 'cable_lengths', 'endcap_jacobian', 'fold', 'in_body_frame', 'inequality_values', 'instruction_set', 'length_jacobian', 'mutual_moments', 'spin_angle', 'two_way_ranges']
 class Status(enum.Enum):
     """
     What a call did with its input.
@@ -1614,6 +1614,10 @@ def in_body_frame(robot: Prism, endcaps: typing.Annotated[numpy.typing.ArrayLike
 def inequality_values(robot: Prism, endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"], constraints: ConstraintSet) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 1]"]:
     """
     Left-hand sides of the inequalities of T eq. (15) [m, m^2 or m^3], all positive for a shape that satisfies them. Printed and corrected set: 15d (2), 15e (2), 15g to 15l; mutual moments: three.
+    """
+def instruction_set() -> str:
+    """
+    What this core is compiled for: 'x86-64-v3' (AVX2 and FMA), 'native', or 'baseline'.
     """
 def length_jacobian(robot: Prism, endcaps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 10]"]:
     """
