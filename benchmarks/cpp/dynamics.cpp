@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "runner.hpp"
+#include "tensegrity/math/so3.hpp"
 
 namespace {
 
@@ -66,8 +67,7 @@ Robot<Scalar> superball() {
   }
   // Onto the face whose outward normal is (-1, -1, -1).
   const Eigen::Vector3d down = Eigen::Vector3d(-1, -1, -1).normalized();
-  const auto turn = Eigen::Quaterniond::FromTwoVectors(down, -Eigen::Vector3d::UnitZ());
-  robot.positions = turn.toRotationMatrix() * robot.positions;
+  robot.positions = shortest_rotation<double>(down, -Eigen::Vector3d::UnitZ()) * robot.positions;
   robot.positions.row(2).array() -= robot.positions.row(2).minCoeff();
   return robot;
 }

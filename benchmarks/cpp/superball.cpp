@@ -6,6 +6,7 @@
 
 #include "runner.hpp"
 #include "tensegrity/dynamics/single_precision.hpp"
+#include "tensegrity/math/so3.hpp"
 #include "tensegrity/ukf/ranging_estimator.hpp"
 
 namespace {
@@ -53,7 +54,7 @@ class Superball {
         anchors_(anchors()),
         estimator_(body_, anchors_, std::move(simulator), rest_lengths(), config()) {
     // The robot stands, level enough: on a face, its axis (1, 1, 1) upright.
-    turn_ = Eigen::Quaternion<Scalar>::FromTwoVectors(V3(1, 1, 1), V3::UnitZ()).toRotationMatrix();
+    turn_ = shortest_rotation<Scalar>(V3(1, 1, 1).normalized(), V3::UnitZ());
     for (const V3& node : body_.nodes) up_.z() = std::max(up_.z(), -(turn_ * node).z());
     // Until the search for the start is over.
     while (estimator_.state().health.updates == 0) update();

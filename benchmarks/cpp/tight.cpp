@@ -37,7 +37,7 @@ struct Rig {
     const Endcaps<Scalar> h = robot.undeformed();
     const V3 down = (h.col(3) - h.col(1)).cross(h.col(5) - h.col(1)).normalized();
     const V3 outward = down.dot(h.col(1)) > 0 ? down : V3(-down);
-    belief.rotation = Eigen::Quaternion<Scalar>::FromTwoVectors(outward, -V3::UnitZ()).matrix();
+    belief.rotation = shortest_rotation<Scalar>(outward, -V3::UnitZ());
     belief.columns(2, 1) = robot.endcap_radius - (belief.rotation * h).row(2).minCoeff();
     auto variance = belief.covariance.diagonal();
     variance.template head<Belief::kEndcaps>().setConstant(Scalar(1e-4));

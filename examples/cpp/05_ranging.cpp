@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <random>
 #include <tensegrity/dynamics/simulator.hpp>
+#include <tensegrity/math/so3.hpp>
 #include <tensegrity/ukf/ranging_estimator.hpp>
 
 namespace {
@@ -47,8 +48,9 @@ int main() {
   for (int k = 0; k < 24; ++k) rest_lengths[k] = dynamics.net().cables[std::size_t(k)].rest_length;
 
   // The truth: the robot settles on the face of nodes 5, 7 and 8, a metre from the origin.
-  const Eigen::Vector3d down = robot.nodes[5] + robot.nodes[7] + robot.nodes[8];
-  const auto turn = Eigen::Quaterniond::FromTwoVectors(down, -Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d down = (robot.nodes[5] + robot.nodes[7] + robot.nodes[8]).normalized();
+  const Eigen::Matrix3d turn =
+      tensegrity::shortest_rotation<double>(down, -Eigen::Vector3d::UnitZ());
   const Eigen::Vector3d place(1, 0, -(turn * robot.nodes[5]).z());
   Simulator<double>::States truth = Simulator<double>::States::Zero(1, 72);
   for (int i = 0; i < 12; ++i) {

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "tensegrity/contact/detector.hpp"
+#include "tensegrity/math/so3.hpp"
 
 namespace {
 
@@ -27,8 +28,7 @@ Endcaps<Scalar> on_face_035() {
   const Endcaps<Scalar> q = Prism<Scalar>().undeformed();
   Vector3<Scalar> up = (q.col(3) - q.col(0)).cross(q.col(5) - q.col(0)).normalized();
   if (up.dot(q.rowwise().mean() - q.col(0)) < 0) up = -up;
-  const auto turn = Eigen::Quaternion<Scalar>::FromTwoVectors(up, Vector3<Scalar>::UnitZ());
-  return turn.toRotationMatrix() * q;
+  return tensegrity::shortest_rotation<Scalar>(up, Vector3<Scalar>::UnitZ()) * q;
 }
 
 // Any six points about the size of the robot.

@@ -5,6 +5,7 @@
 
 #include "allocations.hpp"
 #include "doctest/doctest.h"
+#include "tensegrity/math/so3.hpp"
 #include "tensegrity/ukf/ranging_estimator.hpp"
 
 using namespace tensegrity;
@@ -63,7 +64,7 @@ struct World {
     const Vector3<double> down = (robot.nodes[5] + robot.nodes[7] + robot.nodes[8]).normalized();
     const Matrix3<double> turn =
         Eigen::AngleAxisd(heading, Vector3<double>::UnitZ()).toRotationMatrix() *
-        Eigen::Quaterniond::FromTwoVectors(down, -Vector3<double>::UnitZ()).toRotationMatrix();
+        tensegrity::shortest_rotation<double>(down, -Vector3<double>::UnitZ());
     const double height = -(turn * robot.nodes[5]).z();
     for (int i = 0; i < 12; ++i) {
       positions.segment<3>(3 * i) =

@@ -19,7 +19,7 @@
 
 #include <cmath>
 
-#include "tensegrity/types.hpp"
+#include "tensegrity/math/so3.hpp"
 
 namespace tensegrity::ahrs {
 
@@ -46,7 +46,8 @@ class Madgwick {
   Status start(const V3& force) {
     if (!force.allFinite()) return Status::kNotFinite;
     if (!(force.norm() > 0 && force.norm() <= settings_.largest_force)) return Status::kOutOfRange;
-    orientation_ = Quaternion::FromTwoVectors(force, V3::UnitZ());
+    // Not by Eigen: it decomposes a matrix, which takes a compiler ten seconds.
+    orientation_ = shortest_rotation<Scalar>(force.normalized(), V3::UnitZ());
     started_ = true;
     return Status::kOk;
   }
