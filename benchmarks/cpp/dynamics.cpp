@@ -67,7 +67,8 @@ Robot<Scalar> superball() {
   }
   // Onto the face whose outward normal is (-1, -1, -1).
   const Eigen::Vector3d down = Eigen::Vector3d(-1, -1, -1).normalized();
-  robot.positions = shortest_rotation<double>(down, -Eigen::Vector3d::UnitZ()) * robot.positions;
+  robot.positions =
+      tensegrity::shortest_rotation<double>(down, -Eigen::Vector3d::UnitZ()) * robot.positions;
   robot.positions.row(2).array() -= robot.positions.row(2).minCoeff();
   return robot;
 }
